@@ -1,0 +1,26 @@
+"""Differentiable smoothed-particle hydrodynamics in JAX."""
+
+__version__ = "0.1.0"
+
+from . import arrangements as arrangements
+from . import effects as effects
+from . import integrate as integrate
+from . import kernels as kernels
+from . import scenes as scenes
+from .domain import Box as Box
+from .fluid import Fluid as Fluid
+from .fluid import LinearEquationOfState as LinearEquationOfState
+from .full_model import FullModel as FullModel
+from .functional import SPHFunctional as SPHFunctional
+from .integrate import SimulationError as SimulationError
+from .neighbors import CellGrid as CellGrid
+from .neighbors import NeighborSearch as NeighborSearch
+from .neighbors import VerletList as VerletList
+from .pairs import PairTerm as PairTerm
+from .pairs import Space as Space
+from .pairs import pair_sum as pair_sum
+from .particles import ParticleState as ParticleState
+from .simulate import run_scene as run_scene
+from .simulate import simulate as simulate
+from .trajectory import Snapshot as Snapshot
+from .trajectory import Trajectory as Trajectory

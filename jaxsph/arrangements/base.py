@@ -1,0 +1,23 @@
+"""What an arrangement is."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import asdict, dataclass
+
+from jaxtyping import Array, Float
+
+from ..pairs import Space
+
+
+@dataclass(frozen=True)
+class Arrangement(abc.ABC):
+    """A rule that fills a box with particles of equal volume."""
+
+    @abc.abstractmethod
+    def positions(self, space: Space) -> Float[Array, "particles dim"]:
+        """Positions [m] that fill `space.box` at the spacing of `space`, outside jit."""
+
+    def record(self) -> dict:
+        """The rule and its settings, JSON-like."""
+        return {"rule": type(self).__name__, **asdict(self)}

@@ -1,0 +1,43 @@
+"""The fluid and its equation of state."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+class LinearEquationOfState(eqx.Module):
+    """p = c0^2 (rho - rho0), the paper's equation of state for a weakly compressible fluid."""
+
+    def pressure(self, density: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Pressure [Pa] of a density [kg/m^3]."""
+        return sound_speed**2 * (density - reference_density)
+
+    def density(self, pressure: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Density [kg/m^3] of a pressure [Pa]."""
+        return reference_density + pressure / sound_speed**2
+
+
+class Fluid(eqx.Module):
+    """A weakly compressible fluid.
+
+    Args:
+        reference_density: rho0 [kg/m^3].
+        sound_speed: c0 [m/s]; about ten times the largest speed.
+        reference_speed: U, the largest speed expected [m/s]; Ma = U / c0.
+        equation_of_state: gives pressure from density and back.
+    """
+
+    reference_density: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    sound_speed: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    reference_speed: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    equation_of_state: LinearEquationOfState = LinearEquationOfState()
+
+    def pressure(self, density: Array) -> Array:
+        """Pressure [Pa] of a density [kg/m^3] by the equation of state."""
+        return self.equation_of_state.pressure(density, self.reference_density, self.sound_speed)
+
+    def density(self, pressure: Array) -> Array:
+        """Density [kg/m^3] of a pressure [Pa] by the equation of state."""
+        return self.equation_of_state.density(pressure, self.reference_density, self.sound_speed)

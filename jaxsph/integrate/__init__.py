@@ -1,0 +1,8 @@
+"""Integration in time: the model protocol, the RK4 loop and its faults."""
+
+from .faults import Fault as Fault
+from .faults import FaultCode as FaultCode
+from .faults import SimulationError as SimulationError
+from .loop import integrate as integrate
+from .model import Model as Model
+from .runge_kutta import rk4_step as rk4_step

@@ -1,0 +1,41 @@
+"""The protocol that the time loop speaks: full and reduced models are the same kind of thing."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from ..trajectory import Snapshot
+from .faults import Fault
+
+
+class Model(eqx.Module):
+    """A dynamical system dy/dt = f(t, y) with an auxiliary structure (a neighbour list, say) that
+    is rebuilt now and then and is not differentiated."""
+
+    @abc.abstractmethod
+    def prepare(self, state: Any) -> Any:
+        """The auxiliary structure for a state, built anew."""
+
+    @abc.abstractmethod
+    def refresh(self, auxiliary: Any, state: Any, time_step: Float[Array, ""]) -> Any:
+        """The auxiliary structure, rebuilt if it would not last another step."""
+
+    @abc.abstractmethod
+    def rates(self, time: Float[Array, ""], state: Any, auxiliary: Any) -> Any:
+        """dy/dt, a pytree like the state."""
+
+    @abc.abstractmethod
+    def finish(self, state: Any) -> Any:
+        """A state as a step leaves it (positions wrapped into the box)."""
+
+    @abc.abstractmethod
+    def inspect(self, step: Array, state: Any, auxiliary: Any) -> Fault:
+        """What is wrong with a step's result, if anything."""
+
+    @abc.abstractmethod
+    def observe(self, state: Any) -> Snapshot:
+        """The particle fields to record."""

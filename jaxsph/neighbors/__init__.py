@@ -1,0 +1,6 @@
+"""Fixed-capacity neighbour search: a cell grid, and the Verlet list that it fills."""
+
+from .cell_grid import CellBins as CellBins
+from .cell_grid import CellGrid as CellGrid
+from .verlet_list import NeighborSearch as NeighborSearch
+from .verlet_list import VerletList as VerletList

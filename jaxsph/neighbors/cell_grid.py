@@ -1,0 +1,120 @@
+"""A grid of equal cells over the box, each holding up to a fixed number of particles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..domain import Box
+
+
+class CellBins(eqx.Module):
+    """Particles sorted into cells.
+
+    `order[k]` is the particle at place k of the sorted order; `members[c]` are the sorted places
+    in cell c, filled up with N; the row past the last cell is empty. `cell` and `slot` say for each
+    sorted place where in `members` it stands.
+    """
+
+    order: Int[Array, " particles"]
+    members: Int[Array, "cells_and_one capacity"]
+    cell: Int[Array, " particles"]
+    slot: Int[Array, " particles"]
+    overflow: Bool[Array, ""]
+
+    @property
+    def inverse(self) -> Int[Array, " particles"]:
+        """Each particle's place in the sorted order."""
+        return jnp.argsort(self.order)
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """A static grid of cells over a box (Viccione et al. 2008), for any dimension.
+
+    Args:
+        box: the domain.
+        shape: cells per direction.
+        reach: how many cells away, in each direction, a cell's neighbourhood extends.
+    """
+
+    box: Box
+    shape: tuple[int, ...]
+    reach: int = 1
+
+    @classmethod
+    def with_width(cls, box: Box, width: float, reach: int = 1) -> CellGrid:
+        """The finest grid whose cells are at least `width` [m] wide."""
+        return cls(box, tuple(max(1, int(length / width)) for length in box.lengths), reach)
+
+    @property
+    def cells(self) -> int:
+        return int(np.prod(self.shape))
+
+    @property
+    def widths(self) -> tuple[float, ...]:
+        return tuple(length / n for length, n in zip(self.box.lengths, self.shape, strict=True))
+
+    @cached_property
+    def stencil(self) -> np.ndarray:
+        """(cells, neighbours): the cells around each cell, itself included, each cell once.
+
+        The number `cells` stands for "outside the box".
+        """
+        index = np.indices(self.shape).reshape(len(self.shape), -1)
+        offsets = []
+        for n, periodic in zip(self.shape, self.box.periodic, strict=True):
+            around = np.arange(-self.reach, self.reach + 1)
+            # in a narrow periodic box the stencil would meet itself: each cell counts once
+            offsets.append(np.arange(n) if periodic and len(around) > n else around)
+        around = np.stack(np.meshgrid(*offsets, indexing="ij"), -1).reshape(-1, len(self.shape))
+        outside = np.zeros((self.cells, len(around)), bool)
+        flat = np.zeros((self.cells, len(around)), np.int64)
+        for k, (n, periodic) in enumerate(zip(self.shape, self.box.periodic, strict=True)):
+            place = index[k][:, None] + around[None, :, k]
+            if not periodic:
+                outside |= (place < 0) | (place >= n)
+            flat = flat * n + place % n
+        return np.where(outside, self.cells, flat).astype(np.int32)
+
+    @cached_property
+    def centers(self) -> np.ndarray:
+        """(cells, dim) midpoints of the cells [m]."""
+        index = np.indices(self.shape).reshape(len(self.shape), -1).T
+        return np.asarray(self.box.lower) + (index + 0.5) * np.asarray(self.widths)
+
+    def locate(self, position: Float[Array, "points dim"]) -> Int[Array, " points"]:
+        """The cell of each point; a point outside a closed box belongs to the nearest cell."""
+        position = self.box.wrap(position)
+        flat = jnp.zeros(position.shape[0], jnp.int32)
+        for k, n in enumerate(self.shape):
+            place = (position[:, k] - self.box.lower[k]) * (1.0 / self.widths[k])
+            flat = flat * n + jnp.clip(place.astype(jnp.int32), 0, n - 1)
+        return flat
+
+    def occupancy(self, position: Float[Array, "points dim"]) -> int:
+        """The largest number of points in one cell (outside jit, to choose a capacity)."""
+        return int(np.bincount(np.asarray(self.locate(position)), minlength=self.cells).max())
+
+    def bin(self, position: Float[Array, "points dim"], capacity: int) -> CellBins:
+        """Sort points into cells that hold at most `capacity` each; says so when one overflows."""
+        cell = self.locate(position)
+        order = jnp.argsort(cell).astype(jnp.int32)
+        cell = cell[order]
+        edges = jnp.searchsorted(
+            cell, jnp.arange(self.cells + 2, dtype=cell.dtype), method="sort"
+        ).astype(jnp.int32)
+        start, end = edges[:-1], edges[1:]
+        places = start[:, None] + jnp.arange(capacity, dtype=jnp.int32)[None, :]
+        return CellBins(
+            order=order,
+            members=jnp.where(places < end[:, None], places, position.shape[0]).astype(jnp.int32),
+            cell=cell,
+            slot=jnp.arange(position.shape[0], dtype=jnp.int32) - start[cell],
+            overflow=jnp.max(end - start) > capacity,
+        )

@@ -1,0 +1,344 @@
+"""The pair sum: sums over neighbours of a function of two particles, with all its derivatives.
+
+    S_i = sum_j g(T_i, T_j)
+
+where T_i is a row of particle fields. This is the one hot loop of the library. Rows of all fields
+are gathered at once, a chunk of particles at a time, and all sums leave in one variadic reduction,
+because XLA would otherwise turn every sum into a loop of its own and recompute the geometry in
+each. The primitive carries its own rules:
+
+- forward mode: the tangent of a pair sum is a pair sum of g's own `jax.jvp`;
+- reverse mode: a neighbour list is symmetric, so the transpose is again a pair sum, with the roles
+  of the two particles exchanged (gathers only, no scatter);
+- batching: members are mapped over one by one, so that the working set stays in cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+from jaxtyping import Array
+
+from .chunks import chunked_map
+from .domain import Box
+from .kernels import Kernel
+from .neighbors import VerletList
+from .vector import Vector
+
+_SLOTS_PER_CHUNK = 120_000  # rows times neighbour slots worked on at a time (measured)
+
+
+# ------------------------------------------------------------------ what users write
+
+
+class Pair:
+    """Geometry of the pair (i, j), computed at first use and shared by all terms of a sum.
+
+    A pair at zero distance (a free slot of the list, or two particles at one place) counts as
+    out of the kernel's support: it adds nothing, nor do its derivatives.
+    """
+
+    def __init__(self, space: Space, i, j):
+        self._space = space
+        self._volume = j.volume
+        self.separation = Vector(
+            space.box.minimum_image(d, k) for k, d in enumerate(j.position - i.position)
+        )  # x_j - x_i
+
+    @cached_property
+    def squared_distance(self) -> Array:
+        squared = self.separation.dot(self.separation)
+        outside = (2.0 * self._space.support) ** 2
+        return jnp.where(squared > 0.0, squared, outside)
+
+    @cached_property
+    def distance(self) -> Array:
+        return jnp.sqrt(self.squared_distance)
+
+    @cached_property
+    def kernel(self) -> Array:
+        """W_ij."""
+        space = self._space
+        return space.kernel.value(self.distance, space.smoothing_length, space.box.dim)
+
+    @cached_property
+    def radial_slope(self) -> Array:
+        """-W'(r) / r V_j, which is (x_j - x_i) . grad_i W_ij V_j / r^2."""
+        space = self._space
+        slope = space.kernel.gradient_over_r(self.distance, space.smoothing_length, space.box.dim)
+        return -slope * self._volume
+
+    @cached_property
+    def gradient(self) -> Vector:
+        """grad_i W_ij V_j."""
+        return self.separation * self.radial_slope
+
+
+@dataclass(frozen=True)
+class Space:
+    """Where pairs live: box, kernel, smoothing length h [m] and particle spacing [m]; static."""
+
+    box: Box
+    kernel: Kernel
+    smoothing_length: float
+    spacing: float
+
+    @property
+    def support(self) -> float:
+        """Radius of the kernel's support [m]."""
+        return self.kernel.support * self.smoothing_length
+
+    def check(self) -> None:
+        """Raise a ValueError if a periodic box is too small for the kernel's support."""
+        for length, periodic in zip(self.box.lengths, self.box.periodic, strict=True):
+            if periodic and length < 2.0 * self.support:
+                raise ValueError(
+                    f"box: a periodic length of {length:g} m is too small for a kernel support of "
+                    f"{self.support:g} m; it needs twice that. Raise the resolution or lower h/dx."
+                )
+
+    @cached_property
+    def kernel_at_spacing(self) -> float:
+        """W(dx)."""
+        with jax.ensure_compile_time_eval():
+            spacing = jnp.asarray(self.spacing)
+            return float(self.kernel.value(spacing, self.smoothing_length, self.box.dim))
+
+
+@dataclass(frozen=True)
+class PairTerm:
+    """One named sum: `function(pair, i, j)` gives a scalar or a `Vector` to add up over j.
+
+    `reads` names the fields of particles i and j that the function uses; only those are gathered.
+    The function must be hashable by value (a module-level function or a frozen dataclass).
+    """
+
+    name: str
+    reads: tuple[str, ...]
+    function: Callable
+
+
+def pair_sum(
+    terms: tuple[PairTerm, ...],
+    fields: Mapping[str, Array],
+    space: Space,
+    neighbors: VerletList,
+) -> dict[str, Array]:
+    """All sums of `terms` in one pass over the pairs.
+
+    Args:
+        terms: the sums wanted; terms that are equal are computed once.
+        fields: per-particle arrays (N,) or (N, k) in the list's sorted order; `position` and
+            `volume` among them.
+        space: kernel and box.
+        neighbors: the list.
+
+    Returns:
+        for each term's name an array (N,), or (N, k) where the term gives a vector.
+
+    Raises:
+        ValueError: if two different terms share a name, or a field is missing.
+    """
+    terms = tuple(dict.fromkeys(terms))
+    names = [term.name for term in terms]
+    if len(set(names)) < len(names):
+        raise ValueError(f"terms: two different terms share a name among {names}; rename one.")
+    wanted = dict.fromkeys(("position", "volume") + tuple(f for term in terms for f in term.reads))
+    missing = [name for name in wanted if name not in fields]
+    if missing:
+        raise ValueError(f"fields: {missing} are read by the terms {names} but nothing gives them.")
+    layout = tuple(
+        (name, fields[name].shape[1] if fields[name].ndim == 2 else 0) for name in wanted
+    )
+    columns = []
+    for name, width in layout:
+        columns += [fields[name][:, k] for k in range(width)] if width else [fields[name]]
+    function = _Composed(terms, space, layout)
+    outputs = pair_sum_p.bind(neighbors.index, *columns, function=function)
+    sums, start = {}, 0
+    for term, width in zip(terms, function.widths(columns[0].dtype), strict=True):
+        if width:
+            sums[term.name] = jnp.stack(outputs[start : start + width], axis=-1)
+        else:
+            sums[term.name] = outputs[start]
+        start += width or 1
+    return sums
+
+
+@dataclass(frozen=True)
+class _Composed:
+    """All terms as one function of the columns of i and of j."""
+
+    terms: tuple[PairTerm, ...]
+    space: Space
+    layout: tuple[tuple[str, int], ...]
+
+    def _named(self, columns):
+        columns, named = list(columns), {}
+        for name, width in self.layout:
+            named[name] = Vector(columns[:width]) if width else columns[0]
+            columns = columns[width or 1 :]
+        return SimpleNamespace(**named)
+
+    def _values(self, here, there):
+        i, j = self._named(here), self._named(there)
+        pair = Pair(self.space, i, j)
+        for term in self.terms:
+            with jax.named_scope(term.name):
+                yield term.function(pair, i, j)
+
+    def __call__(self, here, there):
+        flat = []
+        for value in self._values(here, there):
+            flat += list(value) if isinstance(value, Vector) else [value]
+        return tuple(flat)
+
+    def widths(self, dtype) -> tuple[int, ...]:
+        """Components of each term's value, 0 for a scalar."""
+        found = []
+
+        def probe(*columns):
+            values = list(self._values(columns, columns))
+            found.extend(len(v) if isinstance(v, Vector) else 0 for v in values)
+
+        count = sum(width or 1 for _, width in self.layout)
+        jax.eval_shape(probe, *[jax.ShapeDtypeStruct((1, 1), dtype)] * count)
+        return tuple(found)
+
+
+# ------------------------------------------------------------------ derivatives of pair functions
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """Columns T and tangents of the `active` ones -> tangent of `function`."""
+
+    function: Callable
+    active: tuple[int, ...]
+    count: int  # columns of `function`
+
+    def __call__(self, here, there):
+        def at(here_active, there_active):
+            return self.function(
+                _replace(here[: self.count], self.active, here_active),
+                _replace(there[: self.count], self.active, there_active),
+            )
+
+        primals = tuple([side[k] for k in self.active] for side in (here, there))
+        tangents = tuple(list(side[self.count :]) for side in (here, there))
+        return jax.jvp(at, primals, tangents)[1]
+
+
+@dataclass(frozen=True)
+class _Transposed:
+    """Columns T and cotangents of `function`'s sums -> cotangents of the `active` columns.
+
+    T_i enters the sum of i as the first particle and the sums of its neighbours as the second.
+    """
+
+    function: Callable
+    active: tuple[int, ...]
+    count: int
+
+    def __call__(self, here, there):
+        mine, other = list(here[: self.count]), list(there[: self.count])
+        active = [mine[k] for k in self.active]
+        _, pull = jax.vjp(lambda a: self.function(_replace(mine, self.active, a), other), active)
+        (as_first,) = pull(tuple(here[self.count :]))
+        _, pull = jax.vjp(lambda a: self.function(other, _replace(mine, self.active, a)), active)
+        (as_second,) = pull(tuple(there[self.count :]))
+        return tuple(a + b for a, b in zip(as_first, as_second, strict=True))
+
+
+def _replace(columns, places, values):
+    columns = list(columns)
+    for k, value in zip(places, values, strict=True):
+        columns[k] = value
+    return columns
+
+
+# ------------------------------------------------------------------ the primitive
+
+pair_sum_p = Primitive("pair_sum")
+pair_sum_p.multiple_results = True
+
+
+def _evaluate(index, *columns, function):
+    """Gather rows of all columns at once, reduce all sums in one loop."""
+    table = jnp.stack(columns, axis=-1)
+    width = len(columns)
+
+    def rows(block):
+        here, neighbors = block
+        there = table.at[neighbors].get(mode="promise_in_bounds")
+        shape = neighbors.shape
+        i = [jnp.broadcast_to(here[:, k : k + 1], shape) for k in range(width)]
+        j = [there[:, :, k] for k in range(width)]
+        values = [jnp.broadcast_to(v, shape) for v in function(i, j)]
+        zeros = tuple(jnp.zeros((), table.dtype) for _ in values)
+        return lax.reduce(
+            tuple(values), zeros, lambda a, b: tuple(x + y for x, y in zip(a, b, strict=True)), (1,)
+        )
+
+    return list(chunked_map(rows, (table, index), max(1, _SLOTS_PER_CHUNK // index.shape[1])))
+
+
+def _abstract(index, *columns, function):
+    probe = [jax.ShapeDtypeStruct((1, 1), c.dtype) for c in columns]
+    outputs = jax.eval_shape(lambda *c: function(c, c), *probe)
+    return [jax.core.ShapedArray((columns[0].shape[0],), o.dtype) for o in outputs]
+
+
+def _jvp(primals, tangents, *, function):
+    index, *columns = primals
+    active = tuple(k for k, t in enumerate(tangents[1:]) if type(t) is not ad.Zero)
+    outputs = pair_sum_p.bind(*primals, function=function)
+    if not active:
+        return outputs, [ad.Zero.from_primal_value(o) for o in outputs]
+    linear = _Linearised(function, active, len(columns))
+    moved = [tangents[1 + k] for k in active]
+    return outputs, pair_sum_p.bind(index, *columns, *moved, function=linear)
+
+
+def _transpose(cotangents, index, *columns, function):
+    primals = columns[: function.count]
+    linear = columns[function.count :]
+    if any(map(ad.is_undefined_primal, primals)) or not all(map(ad.is_undefined_primal, linear)):
+        raise NotImplementedError("a pair sum is linear in its tangent columns only")
+    if isinstance(function, _Linearised):
+        flipped = _Transposed(function.function, function.active, function.count)
+    else:
+        flipped = _Linearised(function.function, function.active, function.count)
+    cotangents = [ad.instantiate_zeros(c) for c in cotangents]
+    outputs = pair_sum_p.bind(index, *primals, *cotangents, function=flipped)
+    return [None] * (1 + len(primals)) + list(outputs)
+
+
+def _batch(arguments, axes, *, function):
+    moved = [
+        a if axis is batching.not_mapped else jnp.moveaxis(a, axis, 0)
+        for a, axis in zip(arguments, axes, strict=True)
+    ]
+    mapped = [k for k, axis in enumerate(axes) if axis is not batching.not_mapped]
+
+    def member(rows):
+        return tuple(pair_sum_p.bind(*_replace(moved, mapped, rows), function=function))
+
+    outputs = lax.map(member, [moved[k] for k in mapped])
+    return list(outputs), [0] * len(outputs)
+
+
+pair_sum_p.def_impl(jax.jit(_evaluate, static_argnames="function"))
+pair_sum_p.def_abstract_eval(_abstract)
+mlir.register_lowering(pair_sum_p, mlir.lower_fun(_evaluate, multiple_results=True))
+ad.primitive_jvps[pair_sum_p] = _jvp
+ad.primitive_transposes[pair_sum_p] = _transpose
+batching.primitive_batchers[pair_sum_p] = _batch

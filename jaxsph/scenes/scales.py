@@ -1,0 +1,46 @@
+"""Sizes at which a scene is run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Resolution (particles per unit of the longest side), h/dx, dt [s] and steps per snapshot."""
+
+    resolution: int
+    h_over_dx: float
+    time_step: float
+    steps_per_snapshot: int
+
+    def with_overrides(
+        self,
+        end_time: float,
+        resolution: int | None,
+        h_over_dx: float | None,
+        time_step: float | None,
+    ) -> Scale:
+        """This scale with what is given changed.
+
+        Unless dt is given, dt / dx is kept at most and dt divides the end time [s].
+
+        Raises:
+            ValueError: if a value is out of range.
+        """
+        new = self
+        if resolution is not None:
+            if resolution < 1:
+                raise ValueError(f"resolution: at least 1 particle, got {resolution}.")
+            step = self.time_step * self.resolution / resolution
+            intervals = max(1, math.ceil(end_time / (step * self.steps_per_snapshot) - 1e-9))
+            step = end_time / (intervals * self.steps_per_snapshot)
+            new = replace(new, resolution=int(resolution), time_step=step)
+        if h_over_dx is not None:
+            if not h_over_dx >= 1.0:
+                raise ValueError(f"h_over_dx: at least 1, got {h_over_dx:g}.")
+            new = replace(new, h_over_dx=float(h_over_dx))
+        if time_step is not None:
+            new = replace(new, time_step=float(time_step))
+        return new

@@ -1,0 +1,109 @@
+"""What a scene is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from ..effects import Effect, LaminarViscosity
+from ..fluid import Fluid
+from ..full_model import FullModel
+from ..functional import SPHFunctional
+from ..neighbors import NeighborSearch
+from ..pairs import Space
+from ..particles import ParticleState
+
+CFL = 1.5  # dt <= CFL h / c0 (paper)
+VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
+_SKIN = 0.65  # times dx: rebuilt about every second step of the paper's settings (measured)
+_SKIN_PER_STEP = 3.5  # times the way of the fastest particle in a step, at least
+
+
+class Scene(eqx.Module):
+    """A domain, particles, a fluid and a tuple of effects, with the steps to run it by.
+
+    Args:
+        name: as users type it.
+        effects: what acts on the particles.
+        fluid: the fluid.
+        space: box, kernel, smoothing length, spacing.
+        state: the particles at time 0.
+        time_step: dt [s].
+        end_time: of the run [s].
+        steps_per_snapshot: between recorded snapshots.
+        parameters: what the scene was made with, JSON-like, for the record.
+
+    Raises:
+        ValueError: if the time step is beyond the stability limit.
+    """
+
+    name: str = eqx.field(static=True)
+    effects: tuple[Effect, ...]
+    fluid: Fluid
+    space: Space = eqx.field(static=True)
+    state: ParticleState
+    time_step: float = eqx.field(static=True)
+    end_time: float = eqx.field(static=True)
+    steps_per_snapshot: int = eqx.field(static=True)
+    parameters: dict[str, Any] = eqx.field(static=True, default_factory=dict)
+
+    def __check_init__(self):
+        if self.steps_per_snapshot < 1:
+            raise ValueError(f"steps_per_snapshot: at least 1, got {self.steps_per_snapshot}.")
+        limit = self.stable_time_step
+        if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
+            raise ValueError(
+                f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
+                "(the lesser of 1.5 h/c0 and 0.125 h^2/nu); choose one below it."
+            )
+
+    @property
+    def stable_time_step(self) -> float:
+        """The largest stable step [s]: acoustic CFL of the paper, and viscous limit."""
+        h = self.space.smoothing_length
+        limit = CFL * h / float(self.fluid.sound_speed)
+        for effect in self.effects:
+            if isinstance(effect, LaminarViscosity) and float(effect.viscosity) > 0.0:
+                limit = min(limit, VISCOUS_LIMIT * h**2 / float(effect.viscosity))
+        return limit
+
+    @property
+    def steps(self) -> int:
+        """Steps of the run, a whole number of snapshot intervals."""
+        intervals = max(1, round(self.end_time / (self.time_step * self.steps_per_snapshot)))
+        return intervals * self.steps_per_snapshot
+
+    @property
+    def mass(self):
+        """Mass of a particle [kg]: rho0 dx^n."""
+        return self.fluid.reference_density * self.space.spacing**self.space.box.dim
+
+    def functional(self) -> SPHFunctional:
+        """The scene's effects composed into f(w, t; mu)."""
+        return SPHFunctional(self.effects, self.fluid, self.mass, self.space)
+
+    def search(self, state: ParticleState | None = None, margin: float = 1.1) -> NeighborSearch:
+        """Neighbour search allocated for a state (the initial one if none is given).
+
+        Raises:
+            ValueError: if the box is too small for the kernel's support.
+        """
+        state = self.state if state is None else state
+        motion = float(self.fluid.reference_speed) * self.time_step
+        skin = max(_SKIN * self.space.spacing, _SKIN_PER_STEP * motion)
+        return NeighborSearch.allocate(
+            state.position, self.space.box, self.space.support, skin, margin
+        )
+
+    def model(self, state: ParticleState | None = None, margin: float = 1.1) -> FullModel:
+        """The full model, its neighbour list allocated for a state."""
+        return FullModel(self.functional(), self.search(state, margin))
+
+
+def as_dtype(state: ParticleState, dtype) -> ParticleState:
+    """A state in the wanted precision."""
+    return ParticleState(
+        *(jnp.asarray(a, dtype) for a in (state.position, state.velocity, state.density))
+    )

@@ -1,0 +1,152 @@
+"""The Taylor-Green vortices: the paper's in two dimensions, and the one in three."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from ..arrangements import Arrangement, Packed
+from ..domain import Box
+from ..effects import (
+    Continuity,
+    DensityDiffusion,
+    LaminarViscosity,
+    ParticleShifting,
+    PressureForce,
+    ShiftingTransport,
+)
+from ..fluid import Fluid
+from ..kernels import Kernel, WendlandC2
+from ..pairs import Space
+from ..particles import ParticleState
+from . import taylor_green_solution as exact
+from .scales import Scale
+from .scene import Scene, as_dtype
+
+REFERENCE_DENSITY = 1000.0  # kg/m^3
+REFERENCE_SPEED = 1.0  # m/s
+SCALES = {
+    "small": Scale(resolution=64, h_over_dx=2.0, time_step=2.5e-3, steps_per_snapshot=2),
+    "half": Scale(resolution=150, h_over_dx=4.0, time_step=1e-3, steps_per_snapshot=5),
+    "paper": Scale(resolution=300, h_over_dx=4.0, time_step=5e-4, steps_per_snapshot=10),
+}
+SCALES_3D = {
+    "small": Scale(resolution=20, h_over_dx=2.0, time_step=5e-3, steps_per_snapshot=5),
+    "half": Scale(resolution=40, h_over_dx=2.0, time_step=2.5e-3, steps_per_snapshot=10),
+    "paper": Scale(resolution=64, h_over_dx=2.0, time_step=1.5e-3, steps_per_snapshot=20),
+}
+
+
+def taylor_green(
+    resolution: int | None = None,
+    reynolds: float = 100.0,
+    *,
+    scale: str = "small",
+    h_over_dx: float | None = None,
+    time_step: float | None = None,
+    end_time: float = 1.0,
+    arrangement: Arrangement | None = None,
+    kernel: Kernel | None = None,
+    mach: float = 0.1,
+    dtype=None,
+) -> Scene:
+    """The decaying Taylor-Green vortex on the periodic unit square (paper, first experiment).
+
+    Re = U L / nu with U = 1 m/s and L = 1 m; rho0 = 1000 kg/m^3; delta-plus-SPH with delta = 0.1.
+    The initial density follows from the exact pressure.
+
+    Args:
+        resolution: particles per side; overrides the scale's, time step scaled along.
+        reynolds: Reynolds number.
+        scale: `small` (64 x 64), `half` (150 x 150) or `paper` (300 x 300).
+        h_over_dx: smoothing length over spacing; overrides the scale's.
+        time_step: dt [s]; overrides the scale's.
+        end_time: [s].
+        arrangement: how particles start; packed if none is given.
+        kernel: Wendland C2 if none is given.
+        mach: Mach number U / c0.
+        dtype: float64 or float32; JAX's default if none is given.
+
+    Raises:
+        ValueError: for a Reynolds number, resolution or step out of range.
+    """
+    return _vortex("taylor-green", 2, SCALES, **locals())
+
+
+def taylor_green_3d(
+    resolution: int | None = None,
+    reynolds: float = 100.0,
+    *,
+    scale: str = "small",
+    h_over_dx: float | None = None,
+    time_step: float | None = None,
+    end_time: float = 1.0,
+    arrangement: Arrangement | None = None,
+    kernel: Kernel | None = None,
+    mach: float = 0.1,
+    dtype=None,
+) -> Scene:
+    """The Taylor-Green vortex on the periodic unit cube; arguments as `taylor_green`."""
+    return _vortex("taylor-green-3d", 3, SCALES_3D, **locals())
+
+
+def _vortex(
+    name, dim, scales, *, resolution, reynolds, scale, h_over_dx, time_step, end_time,
+    arrangement, kernel, mach, dtype,
+):  # fmt: skip
+    if scale not in scales:
+        raise ValueError(f"scale: one of {', '.join(scales)}, got {scale!r}.")
+    if not end_time > 0.0:
+        raise ValueError(f"t-end: must be positive, got {end_time:g} s.")
+    if not reynolds > 0.0:
+        raise ValueError(f"reynolds: must be positive, got {reynolds:g}.")
+    if not mach > 0.0:
+        raise ValueError(f"mach: must be positive, got {mach:g}.")
+    chosen = scales[scale].with_overrides(end_time, resolution, h_over_dx, time_step)
+    arrangement = Packed() if arrangement is None else arrangement
+    kernel = WendlandC2() if kernel is None else kernel
+    dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
+    dx = 1.0 / chosen.resolution
+    space = Space(Box.unit_periodic(dim), kernel, chosen.h_over_dx * dx, dx)
+    space.check()
+    viscosity = 1.0 / reynolds
+    fluid = Fluid(*(
+        jnp.asarray(v, dtype)
+        for v in (REFERENCE_DENSITY, REFERENCE_SPEED / mach, REFERENCE_SPEED)
+    ))  # fmt: skip
+    position = arrangement.positions(space)
+    if dim == 2:
+        velocity = exact.velocity(position, 0.0, viscosity)
+        pressure = exact.pressure(position, 0.0, viscosity, REFERENCE_DENSITY)
+    else:
+        velocity = exact.initial_velocity_3d(position)
+        pressure = exact.initial_pressure_3d(position, REFERENCE_DENSITY)
+    density = REFERENCE_DENSITY + pressure * (mach / REFERENCE_SPEED) ** 2
+    return Scene(
+        name=name,
+        effects=(
+            Continuity(),
+            PressureForce(),
+            LaminarViscosity(jnp.asarray(viscosity, dtype)),
+            DensityDiffusion(jnp.asarray(0.1, dtype)),
+            ParticleShifting(),
+            ShiftingTransport(),
+        ),
+        fluid=fluid,
+        space=space,
+        state=as_dtype(ParticleState(position, velocity, density), dtype),
+        time_step=chosen.time_step,
+        end_time=end_time,
+        steps_per_snapshot=chosen.steps_per_snapshot,
+        parameters={
+            "scale": scale,
+            "resolution": chosen.resolution,
+            "reynolds": reynolds,
+            "h_over_dx": chosen.h_over_dx,
+            "time_step": chosen.time_step,
+            "end_time": end_time,
+            "mach": mach,
+            "arrangement": arrangement.record(),
+            "kernel": type(kernel).__name__,
+            "dtype": str(jnp.dtype(dtype)),
+        },
+    )

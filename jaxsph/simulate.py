@@ -1,0 +1,124 @@
+"""Running a model from the host: progress, recording, timing and faults."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .integrate import FaultCode, Model, SimulationError, integrate
+from .trajectory import Snapshot, Trajectory
+
+
+class Recorder(Protocol):
+    """Takes snapshots as the run makes them (an open trajectory file, say)."""
+
+    def append(self, step: int, time: float, snapshot: Snapshot) -> None: ...
+
+
+@eqx.filter_jit
+def _interval(model, state, first_step, time_step, steps):
+    state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1)
+    return state, fault, jax.tree.map(lambda a: a[0], snapshots)
+
+
+def simulate(
+    model: Model,
+    state: Any,
+    *,
+    time_step: float,
+    steps: int,
+    steps_per_snapshot: int,
+    first_step: int = 0,
+    recorder: Recorder | None = None,
+    progress: Callable[[int], None] | None = None,
+    metadata: dict | None = None,
+) -> Trajectory:
+    """Integrate a model by RK4 and return its snapshots, the first being the state given.
+
+    Run time excludes compilation: the first interval runs twice, once to compile.
+
+    Args:
+        model: full or reduced.
+        state: at step `first_step`.
+        time_step: dt [s].
+        steps: number of the last step, a whole number of snapshot intervals from the first.
+        steps_per_snapshot: between snapshots.
+        first_step: 0, or where a resumed run goes on; its own snapshot is not recorded again.
+        recorder: is given each snapshot as it is made.
+        progress: is called with the number of steps done since its last call.
+        metadata: kept with the trajectory, beside `steps`, `run_seconds`, `compile_seconds`.
+
+    Raises:
+        ValueError: if the steps are not whole snapshot intervals.
+        SimulationError: on a fault; all good snapshots have gone to the recorder by then.
+    """
+    if (steps - first_step) % steps_per_snapshot or steps <= first_step:
+        raise ValueError(
+            f"steps: from {first_step} to {steps} must be a whole, positive number of intervals "
+            f"of {steps_per_snapshot} steps."
+        )
+    dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
+    dt = jnp.asarray(time_step, dtype)
+    records, times = [], []
+
+    def record(step, snapshot):
+        snapshot = jax.tree.map(np.asarray, snapshot)
+        records.append(snapshot)
+        times.append(step * time_step)
+        if recorder is not None:
+            recorder.append(step, step * time_step, snapshot)
+
+    if first_step == 0:
+        record(0, model.observe(state))
+    start = clock.perf_counter()
+    jax.block_until_ready(_interval(model, state, np.int32(first_step), dt, steps_per_snapshot))
+    first = clock.perf_counter() - start
+    run_seconds = 0.0
+    for step in range(first_step, steps, steps_per_snapshot):
+        start = clock.perf_counter()
+        state, fault, snapshot = jax.block_until_ready(
+            _interval(model, state, np.int32(step), dt, steps_per_snapshot)
+        )
+        run_seconds += clock.perf_counter() - start
+        if step == first_step:
+            first -= run_seconds
+        if int(fault.code) != FaultCode.NONE:
+            raise SimulationError(fault, time_step)
+        record(step + steps_per_snapshot, snapshot)
+        if progress is not None:
+            progress(steps_per_snapshot)
+    stacked = jax.tree.map(lambda *a: np.stack(a), *records)
+    timings = {
+        "steps": steps - first_step,
+        "time_step": time_step,
+        "run_seconds": run_seconds,
+        "compile_seconds": max(first, 0.0),
+    }
+    return Trajectory(
+        time=np.asarray(times),
+        position=stacked.position,
+        velocity=stacked.velocity,
+        density=stacked.density,
+        pressure=stacked.pressure,
+        coordinates=stacked.coordinates,
+        metadata={**(metadata or {}), **timings},
+    )
+
+
+def run_scene(scene, **options) -> Trajectory:
+    """`simulate` the full model of a scene by the scene's own steps."""
+    return simulate(
+        scene.model(),
+        scene.state,
+        time_step=scene.time_step,
+        steps=scene.steps,
+        steps_per_snapshot=scene.steps_per_snapshot,
+        metadata={"scene": scene.name, "parameters": scene.parameters},
+        **options,
+    )

@@ -1,0 +1,1 @@
+"""Projection-based reduced models of smoothed-particle hydrodynamics."""
