@@ -27,8 +27,8 @@ _EXPLANATIONS = {
     "compressible; use a smaller time step or a higher sound speed",
     FaultCode.NEIGHBOR_OVERFLOW: "a particle has more neighbours than the list holds: particles "
     "have clumped; resume from the last snapshot (which allocates anew) with a larger margin",
-    FaultCode.NEIGHBORS_OUTDATED: "a particle moved more than half the neighbour list's skin in one "
-    "step; use a smaller time step",
+    FaultCode.NEIGHBORS_OUTDATED: "a particle moved more than half the neighbour list's skin in "
+    "one step; use a smaller time step",
     FaultCode.SPLINE_CELL_OVERFLOW: "a cell of the reference splines holds more particles than "
     "allocated: particles have clumped; allocate with a larger margin",
 }

@@ -1,0 +1,179 @@
+"""Reading trajectories from HDF5 files: their layout, and what can be wrong with one."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..particles import ParticleState
+from ..trajectory import Trajectory
+
+FORMAT = "jaxsph trajectory"
+SCHEMA_VERSION = 1
+UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "density": "kg/m^3",
+    "pressure": "Pa",
+    "coordinates": "1",
+    "time": "s",
+    "step": "1",
+}
+FIELDS = ("position", "velocity", "density", "pressure")
+_ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
+OPENING = {"libver": "v110", "locking": "best-effort"}  # v110: the oldest with the growing mode
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+class TrajectoryFileError(ValueError):
+    """A trajectory file that cannot be read or written; one line says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """How far a trajectory file has come, and what it takes to go on.
+
+    Args:
+        scene, parameters: name and record of the scene.
+        time_step: dt [s].
+        steps: number of the run's last step.
+        steps_per_snapshot: between snapshots.
+        complete: whether the run has ended.
+        step: number of the last stored step, -1 if there is none.
+        state: the particles at that step.
+    """
+
+    scene: str
+    parameters: dict[str, Any]
+    time_step: float
+    steps: int
+    steps_per_snapshot: int
+    complete: bool
+    step: int
+    state: ParticleState | None
+
+
+def read_trajectory(path: str | os.PathLike) -> Trajectory:
+    """The trajectory in a file, as far as its run has come, with the metadata it was run with.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file with a snapshot in it.
+    """
+    with opened(Path(path)) as (file, count):
+        if count == 0:
+            raise TrajectoryFileError(f"{path}: holds no snapshot yet; run its scene anew.")
+        metadata = json.loads(_text(file.attrs["metadata"]))
+        if not file.attrs["complete"]:
+            metadata.setdefault("time_step", float(file.attrs["time_step"]))
+            metadata["steps"] = int(file["step"][count - 1])
+        fields = {name: file[name][:count] for name in ("time", *FIELDS)}
+        coordinates = file["coordinates"][:count] if "coordinates" in file else None
+        return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
+
+
+def read_checkpoint(path: str | os.PathLike) -> Checkpoint:
+    """What a file says of its run, and the particles of its last snapshot.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file.
+    """
+    with opened(Path(path)) as (file, count):
+        state = None
+        if count:
+            position, velocity, density, _ = (file[name][count - 1] for name in FIELDS)
+            state = ParticleState(position, velocity, density)
+        return Checkpoint(
+            scene=_text(file.attrs["scene"]),
+            parameters=json.loads(_text(file.attrs["parameters"])),
+            time_step=float(file.attrs["time_step"]),
+            steps=int(file.attrs["steps"]),
+            steps_per_snapshot=int(file.attrs["steps_per_snapshot"]),
+            complete=bool(file.attrs["complete"]),
+            step=int(file["step"][count - 1]) if count else -1,
+            state=state,
+        )
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[h5py.File, int]]:
+    """A trajectory file open to read, checked, and the number of whole snapshots in it."""
+    try:
+        with open(path, "rb") as file:
+            signature = file.read(len(_SIGNATURE))
+    except FileNotFoundError:
+        raise TrajectoryFileError(
+            f"{path}: there is no such file; check its name and folder."
+        ) from None
+    except OSError as error:
+        raise TrajectoryFileError(f"{path}: cannot be read ({error.strerror}).") from None
+    if signature != _SIGNATURE:
+        raise TrajectoryFileError(
+            f"{path}: is not an HDF5 file; give the trajectory.h5 of a run, or run the scene anew."
+        )
+    damaged = TrajectoryFileError(
+        f"{path}: is truncated or damaged and cannot be read; restore a copy or run the scene anew."
+    )
+    try:
+        file = _open_to_read(path)
+    except OSError:
+        raise damaged from None
+    with file:
+        try:
+            _check_schema(path, file)
+            steps = file["step"][:]
+            ends = np.flatnonzero(steps < 0)  # grown, but the number not yet written
+            count = min(int(ends[0]) if ends.size else len(steps), len(file["time"]))
+            present = [name for name in (*FIELDS, "coordinates") if name in file]
+            if any(len(file[name]) < count for name in present):
+                raise damaged
+            yield file, count
+        except TrajectoryFileError:
+            raise
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
+            raise damaged from None
+
+
+def _open_to_read(path: Path) -> h5py.File:
+    """The file; one that is being written, or whose writer was killed, opens only as `swmr`."""
+    try:
+        return h5py.File(path, "r", locking="best-effort")
+    except OSError:
+        return h5py.File(path, "r", swmr=True, **OPENING)
+
+
+def _check_schema(path: Path, file: h5py.File) -> None:
+    attributes = file.attrs
+    if _text(attributes.get("format", "")) != FORMAT:
+        raise TrajectoryFileError(
+            f"{path}: is HDF5 but not a jaxsph trajectory; give the trajectory.h5 of a run."
+        )
+    version = int(attributes.get("schema_version", 0))
+    if version != SCHEMA_VERSION:
+        raise TrajectoryFileError(
+            f"{path}: has schema version {version}, this jaxsph reads {SCHEMA_VERSION}; "
+            "use the version of jaxsph that wrote it, or a newer one."
+        )
+    missing = [f"dataset {name!r}" for name in ("time", "step", *FIELDS) if name not in file]
+    missing += [f"attribute {n!r}" for n in (*_ATTRIBUTES, "complete") if n not in attributes]
+    if missing:
+        raise TrajectoryFileError(
+            f"{path}: lacks {', '.join(missing)}; restore a copy or run the scene anew."
+        )
+    particles = {file[name].shape[1:2] for name in FIELDS}
+    if len(particles) != 1 or file["position"].shape[1:] != file["velocity"].shape[1:]:
+        raise TrajectoryFileError(
+            f"{path}: its datasets disagree on the number of particles; restore a copy or run the "
+            "scene anew."
+        )
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)

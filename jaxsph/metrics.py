@@ -1,0 +1,69 @@
+"""Figures by which runs are judged."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .interpolation import ShepardMap
+from .pairs import Space
+from .trajectory import Trajectory
+
+
+def kinetic_energy(velocity: Float[Array, "*times particles dim"], mass) -> Array:
+    """sum_i m |u_i|^2 / 2 [J], over the last two axes."""
+    return 0.5 * mass * (velocity**2).sum(axis=(-2, -1))
+
+
+def relative_discrepancy(
+    reference: Float[np.ndarray, "times probes"], values: Float[np.ndarray, "times probes"]
+) -> Float[np.ndarray, " times"]:
+    """Percent relative discrepancy at each time (paper, eq. PRD):
+
+    100 mean_i |c_i - c~_i| / (max_i c_i - min_i c_i).
+    """
+    reference, values = np.asarray(reference), np.asarray(values)
+    spread = reference.max(axis=1) - reference.min(axis=1)
+    return 100.0 * np.abs(reference - values).mean(axis=1) / spread
+
+
+def probe_line(space: Space, axis: int, through: tuple[float, ...], count: int) -> np.ndarray:
+    """(count, n) evenly spaced probes [m] along an axis of the box, through a given point."""
+    lower, length = space.box.lower[axis], space.box.lengths[axis]
+    line = np.tile(np.asarray(through, float), (count, 1))
+    line[:, axis] = lower + (np.arange(count) + 0.5) * (length / count)
+    return line
+
+
+def centre_line(space: Space) -> np.ndarray:
+    """Probes on the vertical centre line (along the second axis), one per spacing."""
+    centre = tuple(
+        low + 0.5 * length for low, length in zip(space.box.lower, space.box.lengths, strict=True)
+    )
+    return probe_line(space, 1, centre, round(space.box.lengths[1] / space.spacing))
+
+
+def probe(
+    trajectory: Trajectory, points: np.ndarray, space: Space
+) -> tuple[Float[np.ndarray, "times probes"], Float[np.ndarray, "times probes"]]:
+    """Velocity norm [m/s] and pressure [Pa] at points at all times, by Shepard interpolation."""
+    shepard = ShepardMap.allocate(jnp.asarray(points, trajectory.position.dtype), space)
+
+    @jax.jit
+    def at(position, velocity, pressure):
+        fields = jnp.concatenate([velocity, pressure[:, None]], axis=1)
+        return shepard(position, fields)
+
+    speed, pressure = [], []
+    for k in range(len(trajectory.time)):
+        fields, overflow = at(
+            trajectory.position[k], trajectory.velocity[k], trajectory.pressure[k]
+        )
+        if bool(overflow):
+            raise ValueError(f"probe: particles have clumped at snapshot {k}; cells are too full.")
+        fields = np.asarray(fields)
+        speed.append(np.linalg.norm(fields[:, :-1], axis=1))
+        pressure.append(fields[:, -1])
+    return np.stack(speed), np.stack(pressure)

@@ -1,0 +1,88 @@
+"""Proper orthogonal decomposition."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import numpy as np
+import scipy.linalg
+from jaxsph import Fluid
+from jaxtyping import Float
+
+from .inner_product import InnerProduct
+
+
+class Basis(eqx.Module):
+    """Modes on fixed points, orthonormal in their inner product, and all singular values.
+
+    Args:
+        modes: (G, F, M); field 0 is density [kg/m^3 per unit coordinate], then velocity.
+        centre: (F,) state about which the modes are taken.
+        weights: (F,) of the inner product.
+        singular_values: of the whole snapshot matrix.
+    """
+
+    modes: Float[np.ndarray, "points fields modes"]
+    centre: Float[np.ndarray, " fields"]
+    weights: Float[np.ndarray, " fields"]
+    singular_values: Float[np.ndarray, " snapshots"]
+
+    @property
+    def size(self) -> int:
+        return self.modes.shape[2]
+
+    def truncated(self, modes: int) -> Basis:
+        """The first `modes` modes.
+
+        Raises:
+            ValueError: if there are not so many.
+        """
+        if not 1 <= modes <= self.size:
+            raise ValueError(
+                f"modes: {modes} asked for, but the snapshots give 1 to {self.size}; "
+                "ask for fewer modes or record more snapshots."
+            )
+        return eqx.tree_at(lambda b: b.modes, self, self.modes[:, :, :modes])
+
+
+def pod(
+    snapshots: Float[np.ndarray, "points fields times"],
+    product: InnerProduct,
+    fluid: Fluid,
+    modes: int | None = None,
+) -> Basis:
+    """POD of snapshots by singular value decomposition (paper, eq. SVD), in an inner product.
+
+    Args:
+        snapshots: (G, F, S), density first.
+        product: `Euclidean()` is the paper's.
+        fluid: gives the product its scales.
+        modes: how many to keep; all if none is given.
+
+    Raises:
+        ValueError: if there are fewer snapshots than modes, or a value is not finite.
+    """
+    points, fields, times = snapshots.shape
+    count = min(points * fields, times)
+    if modes is not None and not 1 <= modes <= count:
+        raise ValueError(
+            f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; "
+            "ask for fewer modes or record more snapshots."
+        )
+    if not np.isfinite(snapshots).all():
+        raise ValueError("snapshots: a value is not finite; the full model's run has failed.")
+    centre = np.asarray(product.centre(fluid, fields - 1))
+    weights = np.asarray(product.weights(fluid, fields - 1))
+    scale = np.sqrt(weights)[None, :, None]
+    matrix = ((snapshots - centre[None, :, None]) * scale).reshape(points * fields, times)
+    left, sigma, _ = scipy.linalg.svd(matrix, full_matrices=False, overwrite_a=True)
+    left = left[:, : (modes or count)].reshape(points, fields, -1)
+    return Basis(modes=left / scale, centre=centre, weights=weights, singular_values=sigma)
+
+
+def cumulative_energy(singular_values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+    """Percent cumulative energy 100 sum_{i<=M} sigma_i / sum_i sigma_i for M = 1, 2, ... (paper).
+
+    A sum of sigma, not of sigma squared.
+    """
+    sigma = np.asarray(singular_values, dtype=float)
+    return 100.0 * np.cumsum(sigma) / np.sum(sigma)

@@ -1,0 +1,156 @@
+"""The reduced model: modal coordinates and moving particles, in the protocol of the time loop."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import lax
+from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional
+from jaxsph.full_model import DENSITY_BOUNDS, list_checks, refresh_list
+from jaxsph.integrate import Fault, FaultCode, Model
+from jaxsph.scenes import Scene
+from jaxtyping import Array, Float
+
+from .basis import Basis
+from .field_advection import Advection, PaperAdvection
+from .projection import Projection, PseudoInverse
+from .splines import LocalSplines
+
+
+class ReducedState(eqx.Module):
+    """Reduced coordinates (M,) and particle positions (N, n) [m]; also their rates."""
+
+    coordinates: Float[Array, " modes"]
+    position: Float[Array, "particles dim"]
+
+
+class ReducedModel(Model):
+    """A projection-based reduced model on moving particles (paper, section 3.3):
+
+        d(w^)/dt = projection of f-bar(Phi~(x) w^),    dx/dt = u~ + du~.
+
+    It runs in the full model's loop. At every stage the modes are carried to the particles by
+    local splines, so its cost is that of a full right-hand side and more.
+
+    Args:
+        functional: f-bar, the Eulerian SPH functional.
+        projection: `Galerkin()` or `AdjointPetrovGalerkin(tau)`.
+        splines: of all modes, functions ordered (field, mode).
+        basis: the modes at the reference points, with centre and inner product.
+        search: neighbour search (static).
+    """
+
+    functional: SPHFunctional
+    projection: Projection
+    splines: LocalSplines
+    basis: Basis
+    search: NeighborSearch = eqx.field(static=True)
+
+    @classmethod
+    def of_scene(
+        cls,
+        scene: Scene,
+        basis: Basis,
+        splines: LocalSplines,
+        projection: Projection,
+        advection: Advection | None = None,
+        margin: float = 1.1,
+    ) -> ReducedModel:
+        """The reduced model of a scene; its parameters (viscosity and so on) are the scene's."""
+        advection = PaperAdvection() if advection is None else advection
+        functional = eqx.tree_at(
+            lambda f: f.effects,
+            scene.functional(),
+            advection.eulerian(scene.effects),
+            is_leaf=lambda x: isinstance(x, tuple),
+        )
+        basis = eqx.tree_at(
+            lambda b: (b.modes, b.centre, b.weights),
+            basis,
+            tuple(
+                jnp.asarray(a, scene.state.density.dtype)
+                for a in (basis.modes, basis.centre, basis.weights)
+            ),
+        )
+        return cls(functional, projection, splines, basis, scene.search(margin=margin))
+
+    def modes_at(self, position: Array) -> Float[Array, "particles fields modes"]:
+        """Phi~(x): the modes at particle positions."""
+        fields, count = self.basis.modes.shape[1:]
+        return self.splines(position).reshape(position.shape[0], fields, count)
+
+    def state_at(self, modes: Array, coordinates: Array) -> Float[Array, "particles fields"]:
+        """(rho, u) = centre + Phi~ w^."""
+        return self.basis.centre[None, :] + modes @ coordinates
+
+    def pseudo_inverse(self, modes: Array) -> PseudoInverse:
+        """Phi~^+ in the basis' inner product."""
+        flat = modes.reshape(-1, modes.shape[2])
+        return PseudoInverse(flat, jnp.tile(self.basis.weights, modes.shape[0]))
+
+    def project(self, state: ParticleState) -> ReducedState:
+        """The reduced state nearest to a full one, at the same positions."""
+        fields = jnp.concatenate([state.density[:, None], state.velocity], axis=1)
+        fluctuation = (fields - self.basis.centre[None, :]).reshape(-1)
+        inverse = self.pseudo_inverse(self.modes_at(state.position))
+        return ReducedState(inverse(fluctuation), state.position)
+
+    def reconstruct(self, state: ReducedState) -> ParticleState:
+        """The full state that a reduced one stands for."""
+        fields = self.state_at(self.modes_at(state.position), state.coordinates)
+        return ParticleState(state.position, fields[:, 1:], fields[:, 0])
+
+    def prepare(self, state):
+        return self.search.build(state.position)
+
+    def refresh(self, auxiliary, state, time_step):
+        speed = self.functional.fluid.reference_speed
+        return refresh_list(self.search, auxiliary, state.position, speed * time_step)
+
+    def rates(self, time, state, auxiliary):
+        modes = self.modes_at(state.position)
+        fields = self.state_at(modes, state.coordinates)
+
+        def full_rates(stacked):
+            fields = stacked.reshape(modes.shape[:2])
+            particles = ParticleState(state.position, fields[:, 1:], fields[:, 0])
+            rates = self.functional(time, particles, auxiliary)
+            stacked = jnp.concatenate([rates.density[:, None], rates.velocity], axis=1)
+            return stacked.reshape(-1), rates.position
+
+        stacked = fields.reshape(-1)
+        rates, transport = full_rates(stacked)
+        coordinates = self.projection.reduce(
+            self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates
+        )
+        return ReducedState(coordinates, transport)
+
+    def finish(self, state):
+        box = self.functional.space.box
+        return eqx.tree_at(lambda s: s.position, state, box.wrap(state.position))
+
+    def inspect(self, step, state, auxiliary):
+        position, coordinates = state.position, state.coordinates
+        wild = ~jnp.isfinite(jnp.sum(position, axis=1))
+        lost = ~jnp.all(jnp.isfinite(coordinates))
+        density = self.basis.centre[0] + self.basis.modes[:, 0, :] @ coordinates
+        ratio = lax.stop_gradient(density / self.functional.fluid.reference_density)
+        out = (ratio < DENSITY_BOUNDS[0]) | (ratio > DENSITY_BOUNDS[1])
+        return Fault.first_of(
+            step,
+            (FaultCode.NOT_FINITE, lost, -1),
+            (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
+            (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), -1),
+            *list_checks(self.search, auxiliary, position),
+            (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(position), -1),
+        )
+
+    def observe(self, state):
+        full = self.reconstruct(state)
+        return Snapshot(
+            position=full.position,
+            velocity=full.velocity,
+            density=full.density,
+            pressure=self.functional.fluid.pressure(full.density),
+            coordinates=state.coordinates,
+        )

@@ -1,0 +1,14 @@
+"""Galerkin projection."""
+
+from .base import Projection
+
+
+class Galerkin(Projection):
+    """d(w^)/dt = Phi^+ f-bar(Phi w^) (paper, eq. Galerkin)."""
+
+    @property
+    def name(self):
+        return "galerkin"
+
+    def reduce(self, inverse, functional, state, rates):
+        return inverse(rates)

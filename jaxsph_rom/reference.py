@@ -1,0 +1,62 @@
+"""The reference space: fixed points onto which snapshots of moving particles are mapped."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxsph import Space, Trajectory
+from jaxsph.interpolation import ShepardMap
+from jaxtyping import Array, Float
+
+
+def lagrangian_snapshots(trajectory: Trajectory) -> Float[np.ndarray, "particles fields times"]:
+    """(rho, u) of the particles as they are numbered, density first (paper, eq. snapshots)."""
+    fields = np.concatenate([trajectory.density[..., None], trajectory.velocity], axis=-1)
+    return np.moveaxis(fields, 0, -1)
+
+
+class ReferenceSpace(eqx.Module):
+    """Reference points x_G with the Shepard composition operator G (paper, section 3.1).
+
+    Args:
+        points: (G, n) [m]; the initial or any relaxed configuration of particles.
+        space: box, kernel, smoothing length of the full model.
+    """
+
+    points: Float[Array, "points dim"]
+    space: Space = eqx.field(static=True)
+    shepard: ShepardMap
+
+    def __init__(self, points: Float[Array, "points dim"], space: Space):
+        self.points = jnp.asarray(points)
+        self.space = space
+        self.shepard = ShepardMap.allocate(self.points, space)
+
+    def compose(self, position: Array, fields: Array) -> tuple[Array, Array]:
+        """G: particle fields (N, F) at the reference points (G, F), and the overflow flag."""
+        return self.shepard(position, fields)
+
+    def snapshots(self, trajectory: Trajectory) -> Float[np.ndarray, "points fields times"]:
+        """(rho, u) of all snapshots on the reference points, density first.
+
+        Raises:
+            ValueError: if particles have clumped so that a cell is overfull.
+        """
+        compose = eqx.filter_jit(lambda space, x, f: space.compose(x, f))
+        out = np.empty(
+            (self.points.shape[0], 1 + self.space.box.dim, len(trajectory.time)),
+            trajectory.density.dtype,
+        )
+        for k in range(len(trajectory.time)):
+            density, velocity = trajectory.density[k][:, None], trajectory.velocity[k]
+            fields, overflow = compose(
+                self, trajectory.position[k], np.concatenate([density, velocity], axis=1)
+            )
+            if bool(overflow):
+                raise ValueError(
+                    f"snapshots: particles have clumped at t = {trajectory.time[k]:g} s; "
+                    "the trajectory cannot be mapped."
+                )
+            out[:, :, k] = np.asarray(fields)
+        return out

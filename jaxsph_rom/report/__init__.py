@@ -1,0 +1,11 @@
+"""Cases, their table, their figures and the JSON report."""
+
+from .case import Case as Case
+from .figures import Profile as Profile
+from .figures import centre_line_profiles as centre_line_profiles
+from .figures import discrepancy_history as discrepancy_history
+from .figures import field_snapshots as field_snapshots
+from .figures import modes as modes
+from .figures import singular_values as singular_values
+from .json_report import write_report as write_report
+from .table import format_table as format_table

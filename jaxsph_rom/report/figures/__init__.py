@@ -1,0 +1,8 @@
+"""One figure a file; each takes NumPy arrays and the path to write."""
+
+from .centre_line import Profile as Profile
+from .centre_line import centre_line_profiles as centre_line_profiles
+from .discrepancy import discrepancy_history as discrepancy_history
+from .mode_shapes import modes as modes
+from .snapshots import field_snapshots as field_snapshots
+from .spectrum import singular_values as singular_values
