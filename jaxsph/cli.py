@@ -178,7 +178,7 @@ def _takes(make):
 def _run(options) -> int:
     if options.scene not in SCENES:
         raise ValueError(
-            f"scene {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
+            f"scene: {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
         )
     if options.json is not None:
         check_target(options.json)

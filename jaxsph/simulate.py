@@ -74,41 +74,48 @@ def simulate(
         if recorder is not None:
             recorder.append(step, step * time_step, snapshot)
 
+    def trajectory():
+        stacked = jax.tree.map(lambda *a: np.stack(a), *records)
+        timings = {
+            "steps": step - first_step,
+            "time_step": time_step,
+            "run_seconds": run_seconds,
+            "compile_seconds": max(compile_seconds, 0.0),
+        }
+        return Trajectory(
+            time=np.asarray(times),
+            position=stacked.position,
+            velocity=stacked.velocity,
+            density=stacked.density,
+            pressure=stacked.pressure,
+            coordinates=stacked.coordinates,
+            metadata={**(metadata or {}), **timings},
+        )
+
     if first_step == 0:
         record(0, model.observe(state))
     start = clock.perf_counter()
     jax.block_until_ready(_interval(model, state, np.int32(first_step), dt, steps_per_snapshot))
-    first = clock.perf_counter() - start
-    run_seconds = 0.0
-    for step in range(first_step, steps, steps_per_snapshot):
+    compile_seconds = clock.perf_counter() - start
+    run_seconds, step = 0.0, first_step
+    while step < steps:
         start = clock.perf_counter()
         state, fault, snapshot = jax.block_until_ready(
             _interval(model, state, np.int32(step), dt, steps_per_snapshot)
         )
-        run_seconds += clock.perf_counter() - start
+        elapsed = clock.perf_counter() - start
+        run_seconds += elapsed
         if step == first_step:
-            first -= run_seconds
+            compile_seconds -= elapsed
         if int(fault.code) != FaultCode.NONE:
-            raise SimulationError(fault, time_step)
-        record(step + steps_per_snapshot, snapshot)
+            error = SimulationError(fault, time_step)
+            error.trajectory = trajectory() if records else None
+            raise error
+        step += steps_per_snapshot
+        record(step, snapshot)
         if progress is not None:
             progress(steps_per_snapshot)
-    stacked = jax.tree.map(lambda *a: np.stack(a), *records)
-    timings = {
-        "steps": steps - first_step,
-        "time_step": time_step,
-        "run_seconds": run_seconds,
-        "compile_seconds": max(first, 0.0),
-    }
-    return Trajectory(
-        time=np.asarray(times),
-        position=stacked.position,
-        velocity=stacked.velocity,
-        density=stacked.density,
-        pressure=stacked.pressure,
-        coordinates=stacked.coordinates,
-        metadata={**(metadata or {}), **timings},
-    )
+    return trajectory()
 
 
 def run_scene(scene, **options) -> Trajectory:

@@ -1,1 +1,20 @@
 """Projection-based reduced models of smoothed-particle hydrodynamics."""
+
+from .basis import Basis as Basis
+from .basis import Energy as Energy
+from .basis import Euclidean as Euclidean
+from .basis import InnerProduct as InnerProduct
+from .basis import cumulative_energy as cumulative_energy
+from .basis import pod as pod
+from .field_advection import ConsistentAdvection as ConsistentAdvection
+from .field_advection import PaperAdvection as PaperAdvection
+from .model import ReducedModel as ReducedModel
+from .model import ReducedState as ReducedState
+from .projection import AdjointPetrovGalerkin as AdjointPetrovGalerkin
+from .projection import Galerkin as Galerkin
+from .projection import Projection as Projection
+from .reference import ReferenceSpace as ReferenceSpace
+from .reference import lagrangian_snapshots as lagrangian_snapshots
+from .splines import LocalSplines as LocalSplines
+from .study import Experiment as Experiment
+from .study import Study as Study

@@ -5,11 +5,12 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 from jax import lax
+from jaxtyping import Array, Float
+
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional
 from jaxsph.full_model import DENSITY_BOUNDS, list_checks, refresh_list
 from jaxsph.integrate import Fault, FaultCode, Model
 from jaxsph.scenes import Scene
-from jaxtyping import Array, Float
 
 from .basis import Basis
 from .field_advection import Advection, PaperAdvection

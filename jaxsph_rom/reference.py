@@ -5,9 +5,10 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
+
 from jaxsph import Space, Trajectory
 from jaxsph.interpolation import ShepardMap
-from jaxtyping import Array, Float
 
 
 def lagrangian_snapshots(trajectory: Trajectory) -> Float[np.ndarray, "particles fields times"]:

@@ -6,9 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
+from jaxtyping import Array, Bool, Float
+
 from jaxsph import CellGrid, Space
 from jaxsph.chunks import chunked_map
-from jaxtyping import Array, Bool, Float
 
 _BLOCK = 500_000  # particle-node pairs evaluated at a time
 
@@ -48,7 +49,7 @@ class LocalSplines(eqx.Module):
         values: Float[np.ndarray, "points functions"],
         space: Space,
         order: int = 3,
-        margin: float = 1.6,
+        margin: float = 1.3,
     ) -> LocalSplines:
         """Factor each cell's system once and solve it for all functions (host, LAPACK).
 
@@ -100,7 +101,7 @@ class LocalSplines(eqx.Module):
             node_weights[c, : len(index)] = solution[: len(index)]
             linear_weights[c] = solution[len(index) :]
         mean = len(points) / grid.cells
-        capacity = int(margin * mean) + 8
+        capacity = int(margin * mean) + 6
         return cls(
             jnp.asarray(nodes),
             jnp.asarray(node_weights),
@@ -138,9 +139,7 @@ class LocalSplines(eqx.Module):
                 box.minimum_image(padded[members][:, :, k] - center[:, k : k + 1], k) / widths[k]
                 for k in range(dim)
             ]
-            squared = sum(
-                (local[k][:, :, None] - nodes[:, None, :, k]) ** 2 for k in range(dim)
-            )
+            squared = sum((local[k][:, :, None] - nodes[:, None, :, k]) ** 2 for k in range(dim))
             linear = jnp.stack([jnp.ones_like(local[0]), *local], axis=-1)
             radial = polyharmonic(squared, self.order)
             return radial @ node_weights + linear @ linear_weights

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import final
 
 import equinox as eqx
@@ -12,7 +13,7 @@ from jax import lax
 
 from ..full_model import refresh_list
 from ..neighbors import NeighborSearch
-from ..pairs import PairTerm, pair_sum
+from ..pairs import PairTerm, Space, pair_sum
 from .base import Arrangement
 from .jittered_lattice import JitteredLattice
 
@@ -52,7 +53,7 @@ class Packed(Arrangement):
     iterations: int = 1000
 
     def positions(self, space):
-        return self.pack(space)[0]
+        return _packed(self, space, jnp.zeros(()).dtype)
 
     def pack(self, space):
         """Packed positions, the residual reached and the number of iterations it took."""
@@ -88,3 +89,9 @@ class Packed(Arrangement):
         if bool(neighbors.overflow):
             raise ValueError("packing: particles clumped; the box is too small for the spacing.")
         return position, float(reached), int(count)
+
+
+@lru_cache(maxsize=8)
+def _packed(arrangement: Packed, space: Space, dtype):
+    """Scenes that differ in their fluid only share one packing."""
+    return arrangement.pack(space)[0]

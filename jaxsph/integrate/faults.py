@@ -56,7 +56,12 @@ class Fault(eqx.Module):
 
 
 class SimulationError(RuntimeError):
-    """A run met a fault; names the step, its time and the particle."""
+    """A run met a fault; names the step, its time and the particle.
+
+    `trajectory` holds the good snapshots, where `simulate` raised it.
+    """
+
+    trajectory = None
 
     def __init__(self, fault: Fault, time_step: float):
         self.code = FaultCode(int(fault.code))

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+_NODES = np.array([0.0, 0.5, 0.5, 1.0])
+_WEIGHTS = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 
 
 def rk4_step(rates, time, state, time_step):
-    """y + dt/6 (k1 + 2 k2 + 2 k3 + k4) of dy/dt = rates(t, y) (paper, eq. Runge-Kutta)."""
+    """y + dt/6 (k1 + 2 k2 + 2 k3 + k4) of dy/dt = rates(t, y) (paper, eq. Runge-Kutta).
 
-    def moved(fraction, slope):
-        step = fraction * time_step
-        return jax.tree.map(lambda y, k: y + step * k, state, slope)
+    The stages are a `lax.scan`, so that `rates` is compiled once, not four times.
+    """
 
-    half = time + 0.5 * time_step
-    k1 = rates(time, state)
-    k2 = rates(half, moved(0.5, k1))
-    k3 = rates(half, moved(0.5, k2))
-    k4 = rates(time + time_step, moved(1.0, k3))
-    sixth = time_step / 6.0
-    return jax.tree.map(
-        lambda y, a, b, c, d: y + sixth * (a + 2.0 * (b + c) + d), state, k1, k2, k3, k4
-    )
+    def stage(carry, coefficients):
+        slope, new = carry
+        node, weight = coefficients
+        ahead = node * time_step
+        here = jax.tree.map(lambda y, k: y + ahead * k, state, slope)
+        slope = rates(time + ahead, here)
+        gained = weight * time_step
+        return (slope, jax.tree.map(lambda y, k: y + gained * k, new, slope)), None
+
+    coefficients = (jnp.asarray(_NODES, time.dtype), jnp.asarray(_WEIGHTS, time.dtype))
+    (_, new), _ = lax.scan(stage, (jax.tree.map(jnp.zeros_like, state), state), coefficients)
+    return new

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +17,7 @@ import numpy as np
 
 from ..particles import ParticleState
 from ..trajectory import Trajectory
+from .unclosed_file import open_to_read
 
 FORMAT = "jaxsph trajectory"
 SCHEMA_VERSION = 1
@@ -29,7 +32,6 @@ UNITS = {
 }
 FIELDS = ("position", "velocity", "density", "pressure")
 _ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
-OPENING = {"libver": "v110", "locking": "best-effort"}  # v110: the oldest with the growing mode
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -61,6 +63,26 @@ class Checkpoint:
     state: ParticleState | None
 
 
+class _Damaged(TrajectoryFileError):
+    """What is there cannot be made out."""
+
+
+def _patient(read):
+    """A file that grows can look damaged for a moment; read it a few times before giving up."""
+
+    @functools.wraps(read)
+    def attempt(path):
+        for pause in (0.02, 0.05, 0.1):  # s
+            try:
+                return read(path)
+            except _Damaged:
+                time.sleep(pause)
+        return read(path)
+
+    return attempt
+
+
+@_patient
 def read_trajectory(path: str | os.PathLike) -> Trajectory:
     """The trajectory in a file, as far as its run has come, with the metadata it was run with.
 
@@ -79,6 +101,7 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
         return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
 
 
+@_patient
 def read_checkpoint(path: str | os.PathLike) -> Checkpoint:
     """What a file says of its run, and the particles of its last snapshot.
 
@@ -118,35 +141,25 @@ def opened(path: Path) -> Iterator[tuple[h5py.File, int]]:
         raise TrajectoryFileError(
             f"{path}: is not an HDF5 file; give the trajectory.h5 of a run, or run the scene anew."
         )
-    damaged = TrajectoryFileError(
+    damaged = _Damaged(
         f"{path}: is truncated or damaged and cannot be read; restore a copy or run the scene anew."
     )
     try:
-        file = _open_to_read(path)
+        file = open_to_read(path)
     except OSError:
         raise damaged from None
     with file:
         try:
             _check_schema(path, file)
-            steps = file["step"][:]
-            ends = np.flatnonzero(steps < 0)  # grown, but the number not yet written
-            count = min(int(ends[0]) if ends.size else len(steps), len(file["time"]))
-            present = [name for name in (*FIELDS, "coordinates") if name in file]
-            if any(len(file[name]) < count for name in present):
+            lengths = {len(file[name]) for name in UNITS if name in file}
+            if file.attrs["complete"] and len(lengths) > 1:
                 raise damaged
-            yield file, count
+            steps = file["step"][: min(lengths)]
+            yield file, int(np.argmax(np.append(steps, -1) < 0))  # -1: grown but not yet filled
         except TrajectoryFileError:
             raise
         except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError):
             raise damaged from None
-
-
-def _open_to_read(path: Path) -> h5py.File:
-    """The file; one that is being written, or whose writer was killed, opens only as `swmr`."""
-    try:
-        return h5py.File(path, "r", locking="best-effort")
-    except OSError:
-        return h5py.File(path, "r", swmr=True, **OPENING)
 
 
 def _check_schema(path: Path, file: h5py.File) -> None:

@@ -22,7 +22,6 @@ from ..environment import versions
 from ..trajectory import Snapshot
 from .trajectory_file import (
     FORMAT,
-    OPENING,
     SCHEMA_VERSION,
     UNITS,
     TrajectoryFileError,
@@ -32,6 +31,7 @@ from .trajectory_file import (
 # gzip takes a third longer to write than lzf (6 against 4.5 ms a snapshot of 4096 particles) and
 # saves a sixth instead of a tenth; any HDF5 reads it.
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+_OPENING = {"libver": "v110", "locking": "best-effort"}  # v110: the oldest that can grow this way
 _METADATA_SPACE = 16384  # bytes; the attribute keeps the size it has at the start
 
 
@@ -208,7 +208,7 @@ def _begin(path: Path, fill) -> h5py.File:
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = h5py.File(part, "w", **OPENING)
+        file = h5py.File(part, "w", **_OPENING)
     except OSError as error:
         raise _unwritable(path, error) from None
     try:

@@ -6,12 +6,13 @@ import abc
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxsph import Fluid
 from jaxtyping import Array, Float
+
+from jaxsph import Fluid
 
 
 class InnerProduct(eqx.Module):
-    """<a, b> = sum over points and fields of w_f a_f b_f, about a constant centre; fields (rho, u)."""
+    """<a, b> = sum over points and fields f of w_f a_f b_f, about a centre; fields (rho, u)."""
 
     @abc.abstractmethod
     def weights(self, fluid: Fluid, dim: int) -> Float[Array, " fields"]:

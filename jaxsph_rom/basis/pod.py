@@ -5,8 +5,9 @@ from __future__ import annotations
 import equinox as eqx
 import numpy as np
 import scipy.linalg
-from jaxsph import Fluid
 from jaxtyping import Float
+
+from jaxsph import Fluid
 
 from .inner_product import InnerProduct
 

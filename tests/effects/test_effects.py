@@ -1,4 +1,4 @@
-"""Each effect against an exact statement: its limit, its order, what it conserves, its symmetries."""
+"""Each effect against an exact statement: limit, order, what it conserves, symmetries."""
 
 import equinox as eqx
 import jax
@@ -56,9 +56,7 @@ def rates(effects, space, state):
     """dw/dt; compiled once for each dimension, size and set of effects."""
     dim = space.box.dim
     capacity = int(1.4 * {2: np.pi, 3: 4.2}[dim] * (space.support / space.spacing) ** dim)
-    functional = SPHFunctional(
-        effects, Fluid(RHO0, C0, SPEED), RHO0 * space.spacing**dim, space
-    )
+    functional = SPHFunctional(effects, Fluid(RHO0, C0, SPEED), RHO0 * space.spacing**dim, space)
     return rates_of(functional, state, make_list(space, state.position, capacity))
 
 
@@ -102,7 +100,7 @@ def vortices(x):
 
 
 def operator_errors(dim, side, h_over_dx):
-    """Relative errors on a lattice of divergence, pressure gradient, laplacian; size of diffusion."""
+    """Relative errors of divergence, pressure force and laplacian; the size of diffusion."""
     space = make_space(dim, side, h_over_dx)
     x = Lattice().positions(space)
     wave, slope = jnp.sin(K * x).sum(1), K * jnp.cos(K * x)
@@ -172,7 +170,9 @@ def test_density_diffusion_spares_linear_fields_anywhere(dim, side):
     x = JitteredLattice(0.2).positions(space)
     slope = np.arange(1.0, dim + 1.0)
     linear = rates((DensityDiffusion(0.1),), space, still(x, RHO0 * (1.0 + 1e-3 * x @ slope)))
-    wavy = rates((DensityDiffusion(0.1),), space, still(x, RHO0 * (1.0 + 1e-3 * jnp.cos(5.0 * x) @ slope)))
+    wavy = rates(
+        (DensityDiffusion(0.1),), space, still(x, RHO0 * (1.0 + 1e-3 * jnp.cos(5.0 * x) @ slope))
+    )
     # round-off 1e-16 rho0 times delta h c0 / dx^2
     np.testing.assert_allclose(linear.density, 0.0, atol=1e-9)
     assert float(jnp.max(jnp.abs(wavy.density))) > 1e-2
@@ -223,13 +223,14 @@ def test_shifting_transport_conserves_all_but_its_last_term(dim, side):
     weighted = volume * np.asarray(with_shift.density)
     gap = weighted.sum() + mass * divergence.sum()
     assert abs(gap) < 1e-12 * np.abs(weighted).sum()  # round-off
-    # the loss itself: MEASURED of all momentum exchanged on a lattice jittered by 0.2 dx
-    assert np.all(np.abs(last) / size < 0.1)
+    # The loss itself, on a lattice jittered by 0.2 dx: 0.04 to 0.10 m/s^2 over three seeds, where
+    # pressure and viscosity accelerate by 1.7 m/s^2 on average.
+    assert 0.0 < np.abs(du.mean(0)).max() < 0.15
 
 
 def dense_sums(space, state, shift):
     """sum (du_j - du_i).grad W V_j and sum grad W V_j over all pairs, in numpy."""
-    x, shift, dim, h = np.asarray(state.position), np.asarray(shift), space.box.dim, 0.0
+    x, shift, dim = np.asarray(state.position), np.asarray(shift), space.box.dim
     h = space.smoothing_length
     d = x[None] - x[:, None]
     d -= np.round(d)
@@ -266,7 +267,7 @@ def test_particles_shift_from_dense_to_sparse(dim, side):
     space = make_space(dim, side)
     lattice = Lattice().positions(space)
     # displaced by a sin Kx, particles are dense where a K cos Kx < 0, around x = 1/2
-    x = lattice + 0.01 * jnp.sin(K * lattice) * jnp.eye(dim)[0]
+    x = lattice + 0.01 * jnp.sin(K * lattice) * np.eye(dim)[:1]
     shift = np.asarray(rates(SHIFTING, space, still(x)).position)
     uphill = np.asarray(jnp.sin(K * lattice[:, 0]))  # of the concentration's slope along x
     steep = np.abs(uphill) > 0.1
@@ -291,7 +292,7 @@ def test_order_of_particles_does_not_matter(dim, side):
 def test_place_in_a_periodic_box_does_not_matter(dim, side):
     space = make_space(dim, side)
     state = random_state(space)
-    shift = jnp.asarray([0.317, -0.123, 0.771])[:dim]
+    shift = np.asarray([[0.317, -0.123, 0.771]])[:, :dim]
     moved = eqx.tree_at(lambda s: s.position, state, space.box.wrap(state.position + shift))
     expected = rates(PHYSICAL + SHIFTING, space, state)
     # coordinates rounded anew to 1e-16, relative to dx = 1/12
@@ -304,7 +305,7 @@ def test_axes_are_alike(dim, side):
     state = random_state(space)
 
     def turned(s):  # axes renamed, the first one mirrored
-        sign = jnp.asarray([-1.0, 1.0, 1.0])[:dim]
+        sign = np.asarray([[-1.0, 1.0, 1.0]])[:, :dim]
         return ParticleState(s.position[:, ::-1] * sign, s.velocity[:, ::-1] * sign, s.density)
 
     at = eqx.tree_at(lambda s: s.position, turned(state), space.box.wrap(turned(state).position))
@@ -316,7 +317,7 @@ def test_axes_are_alike(dim, side):
 def test_a_uniform_velocity_changes_nothing_but_the_positions(dim, side):
     space = make_space(dim, side)
     state = random_state(space)
-    wind = jnp.asarray([3.0, -2.0, 1.0])[:dim]
+    wind = np.asarray([[3.0, -2.0, 1.0]])[:, :dim]
     blown = eqx.tree_at(lambda s: s.velocity, state, state.velocity + wind)
     effects = (*PHYSICAL, ParticleShifting())
     expected = rates(effects, space, state)
@@ -330,14 +331,14 @@ def test_shifting_transport_feels_wind_only_where_particles_are_uneven(dim, side
     # G_i = sum_j grad W V_j vanishes for an even spread.
     space = make_space(dim, side)
     state = random_state(space)
-    wind = jnp.asarray([3.0, -2.0, 1.0])[:dim]
+    wind = np.asarray([[3.0, -2.0, 1.0]])[:, :dim]
     blown = eqx.tree_at(lambda s: s.velocity, state, state.velocity + wind)
     calm, windy = rates(SHIFTING, space, state), rates(SHIFTING, space, blown)
     shift = np.asarray(calm.position - state.velocity)
     unevenness = dense_sums(space, state, shift)[1]
     factor = 2.0 * RHO0 / np.asarray(state.density) * (shift * unevenness).sum(1)
     found = np.asarray(windy.velocity - calm.velocity)
-    expected = factor[:, None] * np.asarray(wind)
+    expected = factor[:, None] * wind
     np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())  # round-off
     np.testing.assert_allclose(windy.density, calm.density, rtol=1e-11)  # round-off
 

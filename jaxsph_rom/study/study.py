@@ -1,0 +1,240 @@
+"""A study: full runs, a basis from them, reduced runs, and how the two compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import SimulationError, Trajectory
+from jaxsph.metrics import centre_line, probe, relative_discrepancy
+from jaxsph.scenes import Scene
+
+from ..basis import Basis, Euclidean, InnerProduct, pod
+from ..field_advection import Advection, PaperAdvection
+from ..model import ReducedModel, ReducedState
+from ..projection import AdjointPetrovGalerkin, Galerkin, Projection
+from ..reference import ReferenceSpace, lagrangian_snapshots
+from ..report import Case
+from ..splines import LocalSplines
+from .recorded_run import Progress, full_run, recorded_run, with_record
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Reynolds numbers to train on, those to run the reduced model at, and numbers of modes.
+
+    A Reynolds number that is trained on is reconstructed, any other is predicted.
+    """
+
+    trained_on: tuple[float, ...]
+    reynolds: tuple[float, ...]
+    modes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A reduced run beside its full one.
+
+    Args:
+        case: errors and times.
+        time, velocity_percent, pressure_percent: discrepancy on the centre line over time (S,).
+        trajectory: of the reduced model, as far as it came.
+        profile: velocity norm and pressure on the centre line over time, each (S, P).
+    """
+
+    case: Case
+    time: np.ndarray
+    velocity_percent: np.ndarray
+    pressure_percent: np.ndarray
+    trajectory: Trajectory
+    profile: tuple[np.ndarray, np.ndarray]
+
+
+class Study:
+    """Full runs are made once, whatever the number of experiments; all runs are kept on disk.
+
+    Args:
+        make: a scene from a Reynolds number.
+        folder: where trajectories are kept; a study that was cut short goes on from there.
+        projections: to compare.
+        product: inner product and centre of the POD and the projection; the paper's if none.
+        advection: how the Eulerian functional is made; the paper's if none.
+        spline_order: of the polyharmonic splines.
+        progress: opens a progress bar for each run.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[float], Scene],
+        folder: Path,
+        projections: tuple[Projection, ...] | None = None,
+        product: InnerProduct | None = None,
+        advection: Advection | None = None,
+        spline_order: int = 3,
+        progress: Progress | None = None,
+    ):
+        self.scene = cache(make)
+        self.folder = Path(folder)
+        self.projections = (Galerkin(),) if projections is None else projections
+        self.product = Euclidean() if product is None else product
+        self.advection = PaperAdvection() if advection is None else advection
+        self.spline_order = spline_order
+        self.progress = silent if progress is None else progress
+        self.full = cache(self._full)
+        self.centre_line = cache(self._centre_line)
+        self.snapshots = cache(self._snapshots)
+
+    def check(self, experiment: Experiment) -> None:
+        """Raise a ValueError if the experiment asks for more modes than it has snapshots."""
+        available = 0
+        for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
+            scene = self.scene(reynolds)
+            if reynolds in experiment.trained_on:
+                available += scene.steps // scene.steps_per_snapshot + 1
+        for modes in experiment.modes:
+            if not 1 <= modes <= available:
+                raise ValueError(
+                    f"modes: {modes} asked for, but the training runs give {available} snapshots; "
+                    "ask for fewer modes, a longer run or more training runs."
+                )
+
+    def _full(self, reynolds: float) -> Trajectory:
+        return full_run(self.folder / "full", self.scene(reynolds), self.progress)
+
+    def _centre_line(self, reynolds: float) -> tuple[np.ndarray, np.ndarray]:
+        space = self.scene(reynolds).space
+        return probe(self.full(reynolds), centre_line(space), space)
+
+    def reference(self, experiment: Experiment) -> ReferenceSpace:
+        """The reference space: the initial configuration of the first training run."""
+        scene = self.scene(experiment.trained_on[0])
+        return ReferenceSpace(scene.state.position, scene.space)
+
+    def _snapshots(self, reynolds: float, first: float) -> np.ndarray:
+        """Mapped snapshots of a run on the reference space of the run at Re `first`."""
+        scene = self.scene(first)
+        return ReferenceSpace(scene.state.position, scene.space).snapshots(self.full(reynolds))
+
+    def basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
+        """POD basis of the training runs on the reference space."""
+        first = experiment.trained_on[0]
+        matrices = [self.snapshots(reynolds, first) for reynolds in experiment.trained_on]
+        fluid = self.scene(first).fluid
+        return pod(np.concatenate(matrices, axis=-1), self.product, fluid, modes)
+
+    def lagrangian_basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
+        """POD basis of the training runs in Lagrangian space, for comparison."""
+        runs = [lagrangian_snapshots(self.full(reynolds)) for reynolds in experiment.trained_on]
+        fluid = self.scene(experiment.trained_on[0]).fluid
+        return pod(np.concatenate(runs, axis=-1), self.product, fluid, modes)
+
+    def run(self, experiment: Experiment) -> Iterator[Outcome]:
+        """All reduced runs of an experiment, each compared with the full run."""
+        self.check(experiment)
+        for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
+            self.full(reynolds)
+        basis = self.basis(experiment, max(experiment.modes))
+        points = np.asarray(self.reference(experiment).points)
+        values = basis.modes.reshape(len(points), -1)
+        space = self.scene(experiment.trained_on[0]).space
+        splines = LocalSplines.fit(points, values, space, self.spline_order)
+        for modes in experiment.modes:
+            part = basis.truncated(modes)
+            kept = np.arange(values.shape[1]).reshape(-1, basis.size)[:, :modes].reshape(-1)
+            for reynolds in experiment.reynolds:
+                for projection in self.projections:
+                    yield self._reduced(
+                        experiment, reynolds, part, splines.select(kept), projection
+                    )
+
+    def _reduced(self, experiment, reynolds, basis, splines, projection) -> Outcome:
+        scene = self.scene(reynolds)
+        tau = float(projection.tau) if isinstance(projection, AdjointPetrovGalerkin) else None
+        trained = "-".join(f"{r:g}" for r in experiment.trained_on)
+        name = projection.name if tau is None else f"{projection.name}-{tau:g}"
+        recorded = with_record(
+            scene,
+            reduced={
+                "trained_on": list(experiment.trained_on),
+                "modes": basis.size,
+                "projection": projection.name,
+                "tau": tau,
+                "inner_product": type(self.product).__name__,
+                "advection": self.advection.name,
+                "spline_order": self.spline_order,
+            },
+        )
+
+        def restore(trajectory):
+            return ReducedState(
+                jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
+            )
+
+        fault = None
+        try:
+            run = recorded_run(
+                self.folder / "reduced" / f"trained-{trained}" / f"re-{reynolds:g}"
+                / f"m-{basis.size}-{name}.h5",
+                recorded,
+                lambda: ReducedModel.of_scene(scene, basis, splines, projection, self.advection),
+                lambda model: eqx.filter_jit(model.project)(scene.state),
+                restore,
+                f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
+                self.progress,
+            )  # fmt: skip
+        except SimulationError as error:
+            fault, run = error, error.trajectory
+        return self._compare(experiment, reynolds, basis, projection, tau, run, fault)
+
+    def _compare(self, experiment, reynolds, basis, projection, tau, run, fault) -> Outcome:
+        scene, full = self.scene(reynolds), self.full(reynolds)
+        profile = probe(run, centre_line(scene.space), scene.space)
+        # the snapshots of a resumed run that failed again begin later than the full run's
+        first = int(np.argmin(np.abs(full.time - run.time[0])))
+        rows = slice(first, first + len(run.time))
+        truth = tuple(a[rows] for a in self.centre_line(reynolds))
+        percent = [relative_discrepancy(a, b) for a, b in zip(truth, profile, strict=True)]
+        case = Case(
+            scene=scene.name,
+            reynolds=reynolds,
+            modes=basis.size,
+            projection=projection.name,
+            tau=tau,
+            inner_product=type(self.product).__name__.lower(),
+            hyper="none",
+            trained_on=tuple(experiment.trained_on),
+            velocity_peak_percent=float(percent[0].max()),
+            velocity_median_percent=float(np.median(percent[0])),
+            pressure_peak_percent=float(percent[1].max()),
+            pressure_median_percent=float(np.median(percent[1])),
+            stable=fault is None,
+            fom_seconds=_whole_run(full, scene.steps),
+            rom_seconds=_whole_run(run, scene.steps) if fault is None else None,
+            fom_steps=scene.steps,
+            rom_steps=scene.steps if fault is None else fault.step,
+            fom_compile_seconds=full.metadata["compile_seconds"],
+            rom_compile_seconds=run.metadata["compile_seconds"],
+            compression_factor=full.particles * (2 * scene.space.box.dim + 1) / basis.size,
+            fault=None if fault is None else str(fault),
+            fault_time=None if fault is None else fault.step * scene.time_step,
+        )
+        return Outcome(case, run.time, percent[0], percent[1], run, profile)
+
+
+def _whole_run(trajectory: Trajectory, steps: int) -> float:
+    """Run time [s], extrapolated from the last part of a run that was taken up again."""
+    metadata = trajectory.metadata
+    return metadata["run_seconds"] * steps / metadata["steps"]
+
+
+@contextmanager
+def silent(label: str, total: int, done: int):
+    """A progress bar that shows nothing."""
+    yield lambda steps: None

@@ -1,0 +1,154 @@
+"""The report of a study: table, figures and `report.json`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxsph.environment import environment
+from jaxsph.metrics import centre_line
+from jaxsph.scenes import taylor_green_solution as exact
+
+from ..basis import cumulative_energy
+from ..report import (
+    Profile,
+    centre_line_profiles,
+    discrepancy_history,
+    field_snapshots,
+    modes,
+    singular_values,
+    write_report,
+)
+from .study import Experiment, Outcome, Study
+
+_LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
+_SHOWN_MODES = (1, 5, 10)
+_LISTED_MODES = (2, 5, 10, 20, 30)
+
+
+def write_study(
+    study: Study,
+    experiment: Experiment,
+    outcomes: Sequence[Outcome],
+    folder: Path,
+    json_path: Path | None = None,
+    profile_time: float = 0.5,
+) -> dict[str, Any]:
+    """Write `report.json` and the figures of an experiment into a folder.
+
+    Args:
+        study, experiment, outcomes: what was run.
+        folder: where figures go, and the report unless `json_path` is given.
+        json_path: where the report goes.
+        profile_time: at which profiles and fields are shown [s].
+
+    Returns:
+        what the report holds beside its cases.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
+    extra = {
+        "cumulative_energy_percent": {
+            "reference": _listed(basis.singular_values),
+            "lagrangian": _listed(lagrangian.singular_values),
+        },
+        "parameters": study.scene(experiment.trained_on[0]).parameters,
+        "advection": study.advection.name,
+        "spline_order": study.spline_order,
+    }
+    singular_values(
+        lagrangian.singular_values, basis.singular_values, folder / "singular_values.png"
+    )
+    numbers = tuple(n for n in _SHOWN_MODES if n <= basis.size)
+    points = np.asarray(study.reference(experiment).points)
+    start = study.full(experiment.trained_on[0]).position[0]
+    if points.shape[1] == 2:
+        shown = slice(max(numbers))
+        modes(
+            [
+                ("Lagrangian space", start, lagrangian.modes[:, :, shown]),
+                ("reference space", points, basis.modes[:, :, shown]),
+            ],
+            numbers,
+            folder / "modes.png",
+        )
+    discrepancy_history(
+        [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
+        folder / "discrepancy.png",
+    )
+    _profiles(study, outcomes, folder / "centre_line.png", profile_time)
+    if points.shape[1] == 2:
+        _fields(study, outcomes, folder, profile_time)
+    write_report(
+        json_path or folder / "report.json",
+        [outcome.case for outcome in outcomes],
+        environment(),
+        extra,
+    )
+    return extra
+
+
+def _listed(sigma: np.ndarray) -> dict[str, float]:
+    energy = cumulative_energy(sigma)
+    return {str(m): float(energy[m - 1]) for m in _LISTED_MODES if m <= len(energy)}
+
+
+def _name(outcome: Outcome) -> str:
+    case = outcome.case
+    return f"Re {case.reynolds:g}, {_LABELS[case.projection]}, M = {case.modes}"
+
+
+def _by_reynolds(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
+    grouped: dict[float, list[Outcome]] = {}
+    for outcome in outcomes:
+        grouped.setdefault(outcome.case.reynolds, []).append(outcome)
+    return grouped
+
+
+def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float) -> None:
+    profiles = []
+    several = len({o.case.modes for o in outcomes}) > 1
+    for reynolds, group in _by_reynolds(outcomes).items():
+        scene, full = study.scene(reynolds), study.full(reynolds)
+        k = full.nearest(time)
+        line = centre_line(scene.space)
+        speed, pressure = study.centre_line(reynolds)
+        curves = {"full": (speed[k], pressure[k])}
+        for outcome in group:
+            if outcome.time[-1] < full.time[k]:
+                continue  # the run failed before
+            row = outcome.trajectory.nearest(full.time[k])
+            label = _LABELS[outcome.case.projection]
+            label += f", M = {outcome.case.modes}" if several else ""
+            curves[label] = (outcome.profile[0][row], outcome.profile[1][row])
+        if scene.name == "taylor-green":
+            viscosity, density = 1.0 / reynolds, float(scene.fluid.reference_density)
+            velocity = np.asarray(exact.velocity(line, full.time[k], viscosity))
+            curves["analytic"] = (
+                np.linalg.norm(velocity, axis=1),
+                np.asarray(exact.pressure(line, full.time[k], viscosity, density)),
+            )
+        profiles.append(Profile(reynolds, line[:, 1], curves, time=float(full.time[k])))
+    centre_line_profiles(profiles, path)
+
+
+def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float) -> None:
+    for reynolds, group in _by_reynolds(outcomes).items():
+        full = study.full(reynolds)
+        k = full.nearest(time)
+        rows = [_row(f"full, Re {reynolds:g}", full, k)]
+        for outcome in group:
+            if outcome.time[-1] >= full.time[k]:
+                label = f"{_LABELS[outcome.case.projection]}, M = {outcome.case.modes}"
+                row = outcome.trajectory.nearest(full.time[k])
+                rows.append(_row(label, outcome.trajectory, row))
+        field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")
+
+
+def _row(label, trajectory, k):
+    speed = np.linalg.norm(trajectory.velocity[k], axis=1)
+    return label, trajectory.position[k], speed, trajectory.pressure[k]

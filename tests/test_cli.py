@@ -1,0 +1,179 @@
+"""The command line: what it writes and prints, and how it says no."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+import jaxsph
+from jaxsph.arrangements import Lattice
+from jaxsph.cli import main
+from jaxsph.environment import environment
+from jaxsph.integrate import FaultCode, SimulationError
+from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
+from jaxsph.scenes import SCENES, taylor_green
+
+TINY = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.1", "--arrangement", "lattice"]
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def last_line(capsys):
+    return capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_lists_scenes(capsys):
+    assert main(["scenes"]) == 0
+    printed = capsys.readouterr().out
+    for word in (*SCENES, "PressureForce", "small", "half", "paper"):
+        assert word in printed
+
+
+def test_run(tmp_path, capsys):
+    assert main([*TINY, "--reynolds", "50", "--json", "results/run.json"]) == 0
+    captured = capsys.readouterr()
+    trajectory = read_trajectory(tmp_path / "out" / "taylor-green" / "trajectory.h5")
+    assert trajectory.particles == 256
+    assert trajectory.time[-1] == pytest.approx(0.1)
+    assert trajectory.metadata["parameters"]["reynolds"] == 50.0
+    assert jax.config.jax_enable_x64 and trajectory.position.dtype == np.float64
+    results = json.loads((tmp_path / "results" / "run.json").read_text())
+    assert results["steps"] == trajectory.metadata["steps"] == 10
+    assert results["run_seconds"] == trajectory.metadata["run_seconds"] > 0
+    # at h = 2 dx and 16 particles a side; it is 3 and 1 percent, falling with resolution
+    assert 0 < results["errors"]["velocity_relative_l2"] < 0.1
+    assert results["errors"]["kinetic_energy_relative"] < 0.1
+    assert results["versions"]["jaxsph"] == jaxsph.__version__
+    assert results["dtype"] == "float64"
+    for word in ("particles", "steps", "compile", "per particle and step", "velocity error"):
+        assert word in captured.out
+    assert "kinetic energy" in captured.err  # beside the progress bar
+
+
+def test_single_precision_stays_inside(capsys):
+    assert main([*TINY, "--precision", "float32", "--out", "single"]) == 0
+    assert read_trajectory("single/trajectory.h5").velocity.dtype == np.float32
+    assert jax.config.jax_enable_x64
+
+
+def test_three_dimensions_have_no_exact_solution(capsys):
+    run = ["run", "taylor-green-3d", "--resolution", "10", "--t-end", "0.02"]
+    assert main([*run, "--arrangement", "jittered", "--seed", "3", "--json", "run.json"]) == 0
+    results = json.loads(Path("run.json").read_text())
+    assert results["errors"] is None
+    assert results["parameters"]["arrangement"]["seed"] == 3
+    assert "velocity error" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "COMMAND"),
+        (["run"], "SCENE"),
+        (["run", "no-such-scene"], "choose one of taylor-green, taylor-green-3d"),
+        ([*TINY, "--reynolds", "0"], "--reynolds: must be positive and finite, got 0"),
+        ([*TINY, "--reynolds", "-5"], "--reynolds: must be positive and finite, got -5"),
+        ([*TINY, "--reynolds", "nan"], "--reynolds: must be positive and finite, got nan"),
+        ([*TINY, "--reynolds", "many"], "--reynolds"),
+        ([*TINY, "--resolution", "0"], "--resolution: must be at least 1"),
+        ([*TINY, "--resolution", "5"], "too small for a kernel support"),
+        ([*TINY, "--resolution", "9"], "too small for a kernel support"),  # with the list's skin
+        ([*TINY, "--h-over-dx", "0.5"], "h_over_dx: at least 1"),
+        ([*TINY, "--time-step", "0.5"], "beyond the stability limit"),
+        ([*TINY, "--t-end", "-1"], "--t-end: must be positive"),
+        ([*TINY, "--scale", "huge"], "--scale"),
+        ([*TINY, "--seed", "-1"], "--seed"),
+        ([*TINY, "--capacity-margin", "0.5"], "--capacity-margin: must be at least 1"),
+        ([*TINY, "--out", "file"], "Not a directory"),
+        ([*TINY, "--json", "file/run.json"], "Not a directory"),
+        ([*TINY, "--json", "folder"], "is a folder"),
+        (["run", "taylor-green", "--resume", "missing.h5"], "no such file"),
+        (["run", "taylor-green", "--resume", "file"], "not an HDF5 file"),
+        (["run", "taylor-green", "--resume", "file", "--seed", "0"], "--seed: a resumed run"),
+        ([*TINY, "--unknown"], "--unknown"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, arguments, message):
+    (tmp_path / "file").write_text("text")
+    (tmp_path / "folder").mkdir()
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("jaxsph: error: ") and error.count("\n") == 1
+    assert message in error
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["file", "folder"]
+
+
+def test_existing_trajectory_is_kept(capsys):
+    Path("out/taylor-green").mkdir(parents=True)
+    Path("out/taylor-green/trajectory.h5").write_text("precious")
+    assert main(TINY) == 2
+    assert "exists already" in last_line(capsys)
+    assert Path("out/taylor-green/trajectory.h5").read_text() == "precious"
+    assert main([*TINY, "--overwrite"]) == 0
+    assert read_checkpoint("out/taylor-green/trajectory.h5").complete
+
+
+def test_fault_in_mid_run_then_resumed(capsys):
+    # a list without spare room: the lattice fits, what it turns into does not
+    assert main([*TINY, "--capacity-margin", "1", "--out", "run"]) == 1
+    error = last_line(capsys)
+    read = read_trajectory("run/trajectory.h5")
+    assert 0.0 < read.time[-1] < 0.1
+    assert error.startswith("jaxsph: error: step ")
+    assert f"run/trajectory.h5 holds the snapshots up to t = {read.time[-1]:.6g} s." in error
+    resume = ["run", "taylor-green", "--resume", "run/trajectory.h5", "--capacity-margin", "1.3"]
+    assert main(resume) == 0
+    resumed = read_trajectory("run/trajectory.h5")
+    np.testing.assert_array_equal(resumed.position[: len(read.time)], read.position)
+    assert resumed.time[-1] == pytest.approx(0.1)
+    assert resumed.metadata["resumed_from_step"] == round(read.time[-1] / 0.01)
+
+
+def test_fault_keeps_all_snapshots_before_it(tmp_path):
+    # particles fall towards one place, ever closer, until their density leaves its bounds
+    scene = taylor_green(16, arrangement=Lattice(), end_time=1.0)
+    converging = 0.3 * (0.5 - scene.state.position)
+    state = jaxsph.ParticleState(scene.state.position, converging, scene.state.density)
+    with TrajectoryWriter.create(tmp_path / "t.h5", scene) as writer:
+        with pytest.raises(SimulationError) as caught:
+            jaxsph.simulate(
+                scene.model(state, margin=3.0),
+                state,
+                time_step=scene.time_step,
+                steps=scene.steps,
+                steps_per_snapshot=scene.steps_per_snapshot,
+                recorder=writer,
+            )
+        assert caught.value.code != FaultCode.NONE
+        assert caught.value.particle >= 0
+    read = read_trajectory(tmp_path / "t.h5")
+    failed = caught.value.step
+    whole = (failed - 1) // scene.steps_per_snapshot
+    assert len(read.time) == whole + 1 > 1
+    assert np.all(np.isfinite(read.velocity))
+    assert f"step {failed} " in str(caught.value)
+
+
+def test_as_a_module():
+    root = Path(jaxsph.__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-m", "jaxsph", "--version"],
+        env={**os.environ, "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, f"jaxsph {jaxsph.__version__}")
+
+
+def test_environment_tells_no_names_or_folders():
+    text = json.dumps(environment())
+    assert "/home" not in text and os.uname().nodename not in text
