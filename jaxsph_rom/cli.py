@@ -63,14 +63,14 @@ def _parser() -> Parser:
         metavar="RE", help="Reynolds numbers to train on (default: 100 150 200 250)")  # fmt: skip
     add("--predict", type=positive_float, nargs="+", default=[125.0, 175.0, 225.0],
         metavar="RE", help="Reynolds numbers to run at (default: 125 175 225)")  # fmt: skip
-    add("--modes", type=positive_int, nargs="+", default=[5], metavar="M",
-        help="numbers of modes (default: 5)")  # fmt: skip
-    add("--projection", choices=PROJECTIONS, nargs="+", default=list(PROJECTIONS),
-        help="Galerkin, adjoint Petrov-Galerkin (default: both)")  # fmt: skip
+    add("--modes", type=positive_int, nargs="+", default=[3], metavar="M",
+        help="numbers of modes (default: 3)")  # fmt: skip
+    add("--projection", choices=PROJECTIONS, nargs="+", default=["galerkin"],
+        help="Galerkin, adjoint Petrov-Galerkin, or both (default: galerkin)")  # fmt: skip
     add("--tau", type=positive_float, default=1e-4, metavar="T",
         help="memory length of apg [s] (default: %(default)g)")  # fmt: skip
-    add("--inner-product", choices=tuple(PRODUCTS), default="euclidean",
-        help="of POD and projection (default: %(default)s, the paper's)")  # fmt: skip
+    add("--inner-product", choices=tuple(PRODUCTS), default="energy",
+        help="of POD and projection (default: %(default)s; euclidean is the paper's)")  # fmt: skip
     add("--advection", choices=tuple(ADVECTIONS), default="paper",
         help="what is subtracted for the Eulerian functional (default: %(default)s)")  # fmt: skip
     add("--spline-order", type=positive_int, default=3, metavar="K",

@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -59,18 +60,12 @@ def test_run(tmp_path, capsys):
 
 
 def test_single_precision_stays_inside(capsys):
-    assert main([*TINY, "--precision", "float32", "--out", "single"]) == 0
-    assert read_trajectory("single/trajectory.h5").velocity.dtype == np.float32
+    jittered = [*TINY[:-1], "jittered", "--seed", "3"]
+    assert main([*jittered, "--precision", "float32", "--out", "single"]) == 0
+    read = read_trajectory("single/trajectory.h5")
+    assert read.velocity.dtype == np.float32
+    assert read.metadata["parameters"]["arrangement"]["seed"] == 3
     assert jax.config.jax_enable_x64
-
-
-def test_three_dimensions_have_no_exact_solution(capsys):
-    run = ["run", "taylor-green-3d", "--resolution", "10", "--t-end", "0.02"]
-    assert main([*run, "--arrangement", "jittered", "--seed", "3", "--json", "run.json"]) == 0
-    results = json.loads(Path("run.json").read_text())
-    assert results["errors"] is None
-    assert results["parameters"]["arrangement"]["seed"] == 3
-    assert "velocity error" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -138,9 +133,10 @@ def test_fault_in_mid_run_then_resumed(capsys):
 
 
 def test_fault_keeps_all_snapshots_before_it(tmp_path):
-    # particles fall towards one place, ever closer, until their density leaves its bounds
-    scene = taylor_green(16, arrangement=Lattice(), end_time=1.0)
-    converging = 0.3 * (0.5 - scene.state.position)
+    # Particles rush towards the middle at 16/s a direction: their density is beyond its bounds,
+    # 1.2 times as high, after about ln(1.2) / 32 s, which is 6 ms.
+    scene = taylor_green(16, arrangement=Lattice(), time_step=0.001)
+    converging = 16.0 / (2.0 * np.pi) * np.sin(2.0 * np.pi * scene.state.position)
     state = jaxsph.ParticleState(scene.state.position, converging, scene.state.density)
     with TrajectoryWriter.create(tmp_path / "t.h5", scene) as writer:
         with pytest.raises(SimulationError) as caught:
@@ -152,13 +148,14 @@ def test_fault_keeps_all_snapshots_before_it(tmp_path):
                 steps_per_snapshot=scene.steps_per_snapshot,
                 recorder=writer,
             )
-        assert caught.value.code != FaultCode.NONE
+        assert caught.value.code == FaultCode.DENSITY_OUT_OF_BOUNDS
         assert caught.value.particle >= 0
     read = read_trajectory(tmp_path / "t.h5")
     failed = caught.value.step
     whole = (failed - 1) // scene.steps_per_snapshot
     assert len(read.time) == whole + 1 > 1
-    assert np.all(np.isfinite(read.velocity))
+    assert np.max(read.density) < 1200.0
+    assert 4 <= failed <= 10
     assert f"step {failed} " in str(caught.value)
 
 
@@ -176,4 +173,4 @@ def test_as_a_module():
 
 def test_environment_tells_no_names_or_folders():
     text = json.dumps(environment())
-    assert "/home" not in text and os.uname().nodename not in text
+    assert str(Path.home()) not in text and platform.node() not in text

@@ -34,13 +34,12 @@ class Scale:
             if resolution < 1:
                 raise ValueError(f"resolution: at least 1 particle, got {resolution}.")
             step = self.time_step * self.resolution / resolution
-            intervals = max(1, math.ceil(end_time / (step * self.steps_per_snapshot) - 1e-9))
-            step = end_time / (intervals * self.steps_per_snapshot)
             new = replace(new, resolution=int(resolution), time_step=step)
         if h_over_dx is not None:
             if not h_over_dx >= 1.0:
                 raise ValueError(f"h_over_dx: at least 1, got {h_over_dx:g}.")
             new = replace(new, h_over_dx=float(h_over_dx))
         if time_step is not None:
-            new = replace(new, time_step=float(time_step))
-        return new
+            return replace(new, time_step=float(time_step))
+        intervals = max(1, math.ceil(end_time / (new.time_step * new.steps_per_snapshot) - 1e-9))
+        return replace(new, time_step=end_time / (intervals * new.steps_per_snapshot))

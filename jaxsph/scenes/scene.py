@@ -36,7 +36,7 @@ class Scene(eqx.Module):
         parameters: what the scene was made with, JSON-like, for the record.
 
     Raises:
-        ValueError: if the time step is beyond the stability limit.
+        ValueError: if the time step is beyond the stability limit or does not divide the end time.
     """
 
     name: str = eqx.field(static=True)
@@ -57,6 +57,14 @@ class Scene(eqx.Module):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
                 "(the lesser of 1.5 h/c0 and 0.125 h^2/nu); choose one below it."
+            )
+        reached = self.steps * self.time_step
+        if abs(reached - self.end_time) > 1e-6 * self.end_time:
+            interval = self.steps_per_snapshot
+            raise ValueError(
+                f"time step: {interval} steps of {self.time_step:g} s (from snapshot to snapshot) "
+                f"do not divide the end time of {self.end_time:g} s; the nearest step that does "
+                f"is {self.end_time / self.steps:.6g} s."
             )
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from jaxsph import Box, FullModel, Space, run_scene, simulate
+from jaxsph import Box, FullModel, ParticleState, Space, run_scene, simulate
 from jaxsph.arrangements import JitteredLattice, Lattice, Packed
 from jaxsph.effects import ParticleShifting, ShiftingTransport
 from jaxsph.kernels import WendlandC2
@@ -61,24 +61,24 @@ def test_times_and_shapes(scene, trajectory):
 
 def test_kinetic_energy_decays_as_the_exact_solution(trajectory):
     exact = np.asarray(kinetic_energy(trajectory.time, 0.01, 1.0))
-    # exp(-8 pi^2 Re^-1 k..) falls by 27 percent; h = 2 dx at 24 x 24 has viscosity off by 5 percent
-    # and the start's sound waves carry about a percent
-    np.testing.assert_allclose(energy(trajectory), exact, rtol=0.03)
-    assert energy(trajectory)[-1] < 0.9 * energy(trajectory)[0]
+    # 1.5 percent measured: the energy falls by 27 percent, at a rate that is up to 5 percent too
+    # high on the lattice at h = 2 dx (tests/effects)
+    np.testing.assert_allclose(energy(trajectory), exact, rtol=0.02)
+    assert exact[-1] < 0.75 * exact[0]
 
 
 def test_velocity_follows_the_exact_solution(trajectory):
     exact = np.asarray(velocity(jnp.asarray(trajectory.position[-1]), END_TIME, 0.01))
     error = trajectory.velocity[-1] - exact
-    # peaks smoothed by (K h)^2 / 10 or so with K h = 0.52, and acoustics
-    assert np.sqrt((error**2).mean() / (exact**2).mean()) < 0.08
+    # 2.8 percent measured: truncation of (K h)^2 / 10 with K h = 0.52, and sound of the start
+    assert np.sqrt((error**2).mean() / (exact**2).mean()) < 0.05
 
 
 def test_mass_is_exact_and_volume_stays_near_one(scene, trajectory):
     assert float(scene.mass) * SIDE**2 == pytest.approx(1000.0, rel=1e-14)  # rho0, one rounding
     volume = float(scene.mass) * (1.0 / trajectory.density).sum(1)
-    # weakly compressible: density fluctuates by Ma^2 / 2 = 0.5 percent
-    np.testing.assert_allclose(volume, 1.0, atol=5e-3)
+    # 0.23 percent measured: density fluctuates by Ma^2 / 2 = 0.5 percent
+    np.testing.assert_allclose(volume, 1.0, atol=4e-3)
 
 
 def test_particles_stay_in_the_box_and_apart(trajectory):
@@ -96,8 +96,8 @@ def test_momentum_is_constant_without_shifting(unshifted):
 def test_momentum_drift_with_shifting_is_bounded(trajectory):
     momentum = trajectory.velocity.mean(1)
     drift = np.abs(momentum - momentum[:1]).max()
-    # of U = 1 m/s; the scheme's last term is not antisymmetric (effects/shifting_transport)
-    assert 1e-9 < drift < 2e-3
+    # 4e-5 of U = 1 m/s measured: shifting transport's last term is not antisymmetric
+    assert 1e-9 < drift < 2e-4
 
 
 def test_three_dimensional_vortices_decay():
@@ -107,19 +107,22 @@ def test_three_dimensional_vortices_decay():
     assert trajectory.position.shape[1:] == (1000, 3)
     assert float(scene.mass) * 1000 == pytest.approx(1000.0, rel=1e-14)  # one rounding
     assert np.all(np.diff(decay) < 0.0)
-    # At first energy decays as exp(-6 K^2 nu t): by 0.62. 10 particles a wave smooth the laplacian
-    # by a fifth (tests/effects), which is 0.68; vortex stretching is weak until t = 0.2 s.
-    assert decay[-1] / decay[0] == pytest.approx(
-        np.exp(-6.0 * 4.0 * np.pi**2 * 0.01 * 0.2), rel=0.2
-    )
+    # At first energy decays as exp(-6 K^2 nu t), to 0.623; vortex stretching is weak until 0.2 s.
+    # 2.5 percent off measured: 10 particles a wave resolve the laplacian poorly (tests/effects).
+    assert decay[-1] / decay[0] == pytest.approx(np.exp(-0.048 * np.pi**2), rel=0.06)
 
 
 # ------------------------------------------------------------------ one flow, many ways to run it
 
 
-def run_model(scene, model, steps=12):
+def go_on(scene, model, state, steps, first_step=0):
     return simulate(
-        model, scene.state, time_step=scene.time_step, steps=steps, steps_per_snapshot=6
+        model,
+        state,
+        time_step=scene.time_step,
+        steps=steps,
+        first_step=first_step,
+        steps_per_snapshot=scene.steps_per_snapshot,
     )
 
 
@@ -130,34 +133,22 @@ class AlwaysRebuilt(FullModel):
         return self.search.build(state.position)
 
 
-def test_list_kept_over_steps_agrees_with_one_always_rebuilt(scene):
-    model = scene.model(margin=1.2)
-    kept = run_model(scene, model)
-    rebuilt = run_model(scene, AlwaysRebuilt(model.functional, model.search))
-    wide = dataclasses.replace(model.search, skin=1.5 * model.search.skin, capacity=90)
-    widened = run_model(scene, FullModel(model.functional, wide))
-    for other in (rebuilt, widened):
-        # sums in another order: round-off, grown over 12 steps by sound at c0 = 10
-        np.testing.assert_allclose(kept.velocity, other.velocity, atol=1e-11)
-        np.testing.assert_allclose(kept.density, other.density, rtol=1e-12)
+def test_list_kept_over_steps_agrees_with_one_always_rebuilt(scene, trajectory):
+    model = scene.model()
+    rebuilt = go_on(scene, AlwaysRebuilt(model.functional, model.search), scene.state, steps=8)
+    count = len(rebuilt.time)
+    # sums in another order: round-off, grown over 8 steps by sound at c0 = 10
+    np.testing.assert_allclose(rebuilt.velocity, trajectory.velocity[:count], atol=1e-11)
+    np.testing.assert_allclose(rebuilt.density, trajectory.density[:count], rtol=1e-12)
 
 
-def test_a_resumed_run_repeats_the_rest_bit_by_bit(scene):
-    model = scene.model(margin=1.2)
-    whole = run_model(scene, model)
-    half = type(scene.state)(whole.position[1], whole.velocity[1], whole.density[1])
-    rest = simulate(
-        model,
-        half,
-        time_step=scene.time_step,
-        steps=12,
-        first_step=6,
-        steps_per_snapshot=6,
-    )
-    np.testing.assert_array_equal(rest.position[-1], whole.position[-1])
-    np.testing.assert_array_equal(rest.velocity[-1], whole.velocity[-1])
-    np.testing.assert_array_equal(rest.density[-1], whole.density[-1])
-    np.testing.assert_allclose(rest.time, whole.time[2:], rtol=1e-15)
+def test_a_resumed_run_repeats_the_rest_bit_by_bit(scene, trajectory):
+    start = (trajectory.position, trajectory.velocity, trajectory.density)
+    state = ParticleState(*(jnp.asarray(a[-4]) for a in start))
+    first_step = scene.steps - 3 * scene.steps_per_snapshot
+    rest = go_on(scene, scene.model(), state, scene.steps, first_step)
+    for name in ("time", "position", "velocity", "density", "pressure"):
+        np.testing.assert_array_equal(getattr(rest, name), getattr(trajectory, name)[-3:])
 
 
 def test_single_precision_runs_and_stays_close_to_double(trajectory):
@@ -165,9 +156,9 @@ def test_single_precision_runs_and_stays_close_to_double(trajectory):
     for name in ("position", "velocity", "density", "pressure"):
         assert getattr(single, name).dtype == np.float32
     gap = np.abs(single.velocity - trajectory.velocity)
-    # rho - rho0 of 5 in 1000 carries 6e-8 * 1000 / 5 = 1e-5; 30 steps and moving particles amplify
-    assert gap.max() < 5e-3
-    np.testing.assert_allclose(energy(single), energy(trajectory), rtol=1e-4)
+    # 4e-5 measured: rho - rho0 of 5 in 1000 carries 1e-5, and particles that part amplify it
+    assert gap.max() < 5e-4
+    np.testing.assert_allclose(energy(single), energy(trajectory), rtol=1e-6)  # 8e-8 measured
 
 
 # ------------------------------------------------------------------ bad input
@@ -226,7 +217,7 @@ def test_packing_is_even_exact_in_number_and_keeps_distance(dim, side):
     assert np.all((np.asarray(position) >= 0.0) & (np.asarray(position) <= 1.0))
     start = unevenness(space, JitteredLattice().positions(space))
     found = unevenness(space, position)
-    assert found < 0.01 * start
+    assert found < 1e-3 * start  # from 3e-2 to the tolerance of 1e-5
     # the residual reported is the last force's, one step before the positions returned
     assert residual == pytest.approx(found, rel=0.2)
     assert residual <= Packed().tolerance or iterations == Packed().iterations
@@ -234,13 +225,18 @@ def test_packing_is_even_exact_in_number_and_keeps_distance(dim, side):
     assert tree.query(tree.data, k=2)[0][:, 1].min() > 0.7 * space.spacing
 
 
-def test_arrangements_are_reproducible_by_seed():
-    space = box_space(2, 12)
-    for kind in (JitteredLattice, Packed):
-        first = kind(seed=3).positions(space)
-        np.testing.assert_array_equal(first, kind(seed=3).positions(space))
-        assert float(jnp.max(jnp.abs(first - kind(seed=4).positions(space)))) > 0.01 * space.spacing
-        assert kind(seed=3).record() == {"rule": kind.__name__, **dataclasses.asdict(kind(seed=3))}
+def test_arrangements_are_reproducible_by_seed(scene):
+    def differs(a, b):
+        return float(jnp.max(jnp.abs(a - b))) > 0.01 * space.spacing
+
+    space = scene.space
+    first = JitteredLattice(seed=3).positions(space)
+    np.testing.assert_array_equal(first, JitteredLattice(seed=3).positions(space))
+    assert differs(first, JitteredLattice(seed=4).positions(space))
+    packed, _, _ = Packed().pack(space)  # not the kept result that `positions` may give
+    np.testing.assert_array_equal(scene.state.position, packed)
+    assert differs(packed, Packed(seed=1).positions(space))
+    assert Packed(seed=1).record() == {"rule": "Packed", **dataclasses.asdict(Packed(seed=1))}
 
 
 def test_lattices_fill_any_box():
@@ -251,5 +247,5 @@ def test_lattices_fill_any_box():
     np.testing.assert_allclose(position.mean(0), [0.0, 0.75, 0.125], atol=1e-15)  # centred
     assert cKDTree(position).query(position, k=2)[0][:, 1] == pytest.approx(0.125, rel=1e-12)
     moved = np.asarray(JitteredLattice(0.1, 1).positions(space)) - position
-    away = np.abs(np.asarray(box.displacement(jnp.zeros(3), jnp.asarray(moved))))
+    away = np.abs(np.asarray(box.displacement(jnp.zeros_like(moved), jnp.asarray(moved))))
     assert 0.09 * 0.125 < away.max() <= 0.1 * 0.125 * (1.0 + 1e-12)  # round-off

@@ -1,0 +1,1 @@
+"""Benchmarks: `python -m benchmarks.NAME`, run from the root of the repository."""

@@ -1,0 +1,134 @@
+"""Benchmarks run at a tiny size, promise the keys that figures are drawn from, and go on."""
+
+import itertools
+import json
+
+import jax
+import numpy as np
+import pytest
+
+from benchmarks import convergence, right_hand_side, taylor_green_rom
+from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
+from jaxsph.arrangements import JitteredLattice
+from jaxsph.scenes import taylor_green
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def results(path):
+    assert jax.config.jax_enable_x64  # a benchmark's precision stays its own
+    read = json.loads(path.read_text())
+    assert {"versions", "machine", "device"} <= read["environment"].keys()
+    assert "/home" not in path.read_text()
+    return read
+
+
+def test_right_hand_side(tmp_path, capsys):
+    path = tmp_path / "results" / "rhs.json"
+    arguments = ["--particles", "150", "--h-over-dx", "2", "--precision", "float32"]
+    counts = ["--repeats", "2", "--rebuild-steps", "3", "--scale", "small"]
+    assert right_hand_side.main([*arguments, *counts, "--json", str(path)]) == 0
+    read = results(path)
+    for key in (
+        "seconds", "seconds_min", "pairs", "ns_per_pair", "ns_per_pair_min", "cores_busy",
+        "jvp_ratio", "vjp_ratio", "rebuild_seconds", "rebuild_share", "peak_memory_gib",
+    ):  # fmt: skip
+        assert read[key] > 0, key
+    assert read["seconds_spread"] >= 0 and 0 < read["rebuild_share"] < 1
+    assert read["compile_seconds"].keys() == {"primal", "jvp", "vjp", "rebuild"}
+    assert (read["particles"], read["dtype"], read["h_over_dx"]) == (144, "float32", 2.0)
+    assert read["rebuild_steps"] == 4  # whole intervals of two steps
+    assert 2 <= read["rebuilds"] <= 6  # at least at the start of each interval
+    assert "vjp" in capsys.readouterr().out
+
+
+def test_convergence_is_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "convergence.json"
+    same = ["--end-time", "0.05", "--arrangement", "lattice", "--json", str(path)]
+    first = ["--resolutions", "12", "16", "--skip-without-shifting"]
+    assert convergence.main([*first, *same]) == 0
+    (order,) = results(path)["orders"]
+    assert order["resolutions"] == [12, 16] and np.isfinite(order["velocity_error"])
+    rows = results(path)["rows"]
+    assert convergence.main(["--resolutions", "12", *same]) == 0
+    assert "done before: resolution 12" in capsys.readouterr().err
+    *kept, without_shifting = results(path)["rows"]
+    assert kept == rows
+    for row in rows:
+        assert 0 < row["velocity_error"] < 0.1  # 2 percent at t = 0.05 s
+        assert row["kinetic_energy_error"] > 0 and row["pressure_error"] > 0
+        assert row["seconds"] > 0 and row["seconds_per_step"]["repeats"] == 19
+        assert row["fault"] is None and row["mass_error"] < 1e-14
+    # pairwise antisymmetric forces: a few rounding errors of 144 terms each
+    assert not without_shifting["shifting"] and without_shifting["momentum_drift"] < 1e-14
+
+
+def test_reduced_models_are_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "rom.json"
+    same = ["--resolution", "12", "--end-time", "0.1", "--arrangement", "lattice"]
+    same += ["--only", "reconstructive", "--projection", "galerkin", "--json", str(path)]
+    assert taylor_green_rom.main([*same, "--modes", "2"]) == 0
+    read = results(path)
+    (case,) = read["cases"]
+    assert case["kind"] == "reconstructive" and case["trained_on"] == [100.0]
+    assert case["paper_velocity_peak_percent"] is None  # nothing is printed for M = 2
+    assert case["velocity_peak_percent"] > 0 and case["rom_seconds"] > 0
+    energy = read["cumulative_energy_percent"]["euclidean"]
+    assert 0 < energy["reference"]["2"] <= 100 and energy["paper"]["lagrangian"]["2"] == 99.9
+    assert (read["particles"], read["dtype"]) == (144, "float64")
+    capsys.readouterr()
+    assert taylor_green_rom.main([*same, "--modes", "2"]) == 0
+    captured = capsys.readouterr()
+    assert "done before: reconstructive-100-2-galerkin" in captured.err
+    assert "cumulative energy" in captured.out
+    assert results(path)["cases"] == [case]
+    assert taylor_green_rom.main([*same, "--end-time", "0.2"]) == 2
+    assert "other settings" in capsys.readouterr().err
+
+
+def test_cases_of_the_paper():
+    options = taylor_green_rom._parser().parse_args(["--scale", "paper"])
+    wanted = taylor_green_rom._wanted(options)
+    names = {(c.kind, c.reynolds, c.modes, c.projection) for c in wanted}
+    assert names == taylor_green_rom.PAPER.keys() and len(wanted) == 10
+    options = taylor_green_rom._parser().parse_args(["--scale", "half", "--cases", "pred*"])
+    assert {c.reynolds for c in taylor_green_rom._wanted(options)} == {175.0}
+
+
+def test_missing_cases_are_run_once_each():
+    every = [
+        taylor_green_rom.Wanted("predictive", *values)
+        for values in itertools.product((125.0, 175.0), (5, 10), ("galerkin", "apg"))
+    ]
+    assert len(list(taylor_green_rom._products(every))) == 1
+    for count in range(len(every)):
+        left = every[count:]
+        runs = [
+            (reynolds, modes, projection)
+            for group in taylor_green_rom._products(left)
+            for reynolds, modes, projection in itertools.product(*group)
+        ]
+        assert sorted(runs) == sorted((c.reynolds, c.modes, c.projection) for c in left)
+
+
+def test_pairs_against_all_distances():
+    scene = taylor_green(12, arrangement=JitteredLattice())
+    apart = np.asarray(scene.state.position)[:, None] - np.asarray(scene.state.position)
+    apart -= np.round(apart)
+    near = np.linalg.norm(apart, axis=-1) < scene.space.support
+    assert interacting_pairs(scene.state.position, scene.space) == near.sum() - len(near)
+
+
+def test_files(tmp_path):
+    path = tmp_path / "folder" / "file.json"
+    assert read_json(path) is None
+    write_json(path, {"a": np.float64(np.nan), "b": summary([1.0, 3.0])})
+    assert read_json(path)["a"] is None and read_json(path)["b"]["median"] == 2.0
+    assert [p.name for p in path.parent.iterdir()] == ["file.json"]
+    path.write_text("text")
+    with pytest.raises(ValueError, match="not JSON"):
+        read_json(path)
+    assert 0.01 < peak_memory_gib() < 1000

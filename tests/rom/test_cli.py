@@ -1,0 +1,64 @@
+"""`jaxsph-rom run`: results, resuming, and one clear line for bad input."""
+
+import json
+
+import pytest
+
+from jaxsph_rom.cli import main
+
+SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice"]
+KEYS = {
+    "scene", "reynolds", "modes", "projection", "tau", "inner_product", "hyper", "trained_on",
+    "velocity_peak_percent", "velocity_median_percent", "pressure_peak_percent",
+    "pressure_median_percent", "stable", "fom_seconds", "rom_seconds", "fom_steps", "rom_steps",
+}  # fmt: skip
+
+
+def test_a_study_from_one_line(tmp_path, capsys):
+    arguments = [*SMALL, "--train", "100", "200", "--predict", "150", "--modes", "1", "--inner-product", "energy",
+                 "--projection", "galerkin", "apg", "--out", str(tmp_path)]  # fmt: skip
+    assert main(arguments) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert [case["projection"] for case in report["cases"]] == ["galerkin", "apg"]
+    for case in report["cases"]:
+        assert KEYS <= case.keys()
+        assert case["stable"] and case["trained_on"] == [100.0, 200.0]
+        assert 0 < case["velocity_median_percent"] < 5  # ten steps of a slow decay
+        assert case["rom_seconds"] > 0 and case["fom_seconds"] > 0
+    assert report["environment"]["versions"]["jax"]
+    energies = report["cumulative_energy_percent"]
+    assert energies["reference"]["2"] <= 100.0 and energies["lagrangian"]["2"] <= 100.0
+    figures = {path.stem for path in tmp_path.glob("*.png")}
+    assert figures == {
+        "singular_values", "modes", "discrepancy", "centre_line", "fields_re_150"
+    }  # fmt: skip
+    table = capsys.readouterr().out
+    assert "150" in table and "galerkin" in table
+
+    # the same line again computes nothing anew
+    stamps = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.h5")}
+    assert len(stamps) == 5
+    assert main(arguments) == 0
+    assert stamps == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.h5")}
+
+
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["run", "no-such-scene"], "no-such-scene"),
+        ([*SMALL, "--train", "-5"], "--train"),
+        ([*SMALL, "--predict", "0"], "--predict"),
+        ([*SMALL, "--modes", "0"], "--modes"),
+        ([*SMALL, "--modes", "5000"], "5000"),
+        ([*SMALL, "--h-over-dx", "9"], "too small"),
+        ([*SMALL, "--time-step", "1"], "stability limit"),
+        ([*SMALL, "--tau", "x"], "--tau"),
+        (["run", "taylor-green", "--scale", "vast"], "vast"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
+    out = tmp_path / "out"
+    assert main([*arguments, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and word in error
+    assert not out.exists()
