@@ -32,8 +32,8 @@ class Box:
             raise ValueError(
                 f"Box: lower, upper and periodic need 2 or 3 entries each, got {self}."
             )
-        if any(not b > a for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(f"Box: every upper must exceed its lower, got {self}.")
+        if any(not 0.0 < b - a < np.inf for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(f"Box: every upper must exceed its lower, both finite, got {self}.")
 
     @classmethod
     def unit_periodic(cls, dim: int) -> Box:

@@ -324,10 +324,10 @@ def _transpose(cotangents, index, *columns, function):
 
 def _batch(arguments, axes, *, function):
     moved = [
-        a if axis is batching.not_mapped else jnp.moveaxis(a, axis, 0)
+        a if axis is None else jnp.moveaxis(a, axis, 0)
         for a, axis in zip(arguments, axes, strict=True)
     ]
-    mapped = [k for k, axis in enumerate(axes) if axis is not batching.not_mapped]
+    mapped = [k for k, axis in enumerate(axes) if axis is not None]
 
     def member(rows):
         return tuple(pair_sum_p.bind(*_replace(moved, mapped, rows), function=function))

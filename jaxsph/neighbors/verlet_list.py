@@ -85,8 +85,11 @@ class NeighborSearch:
         """Choose capacities for particles near `position`, `margin` times what these need.
 
         Raises:
-            ValueError: if a periodic box is too small for the support and its skin.
+            ValueError: if a periodic box is too small for the support and its skin, or there is
+                no particle.
         """
+        if position.shape[0] == 0:
+            raise ValueError("position: got no particles; give at least one.")
         radius = support + skin
         for length, periodic in zip(box.lengths, box.periodic, strict=True):
             if periodic and length < 2.0 * radius:

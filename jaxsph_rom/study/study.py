@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
+from jaxsph.io import read_trajectory
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
 
@@ -177,29 +178,28 @@ class Study:
                 jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
             )
 
+        product = type(self.product).__name__.lower()
+        path = self.folder / "reduced" / f"{product}-{trained}" / f"re-{reynolds:g}"
+        path = path / f"m-{basis.size}-{name}.h5"
         fault = None
         try:
             run = recorded_run(
-                self.folder / "reduced" / f"trained-{trained}" / f"re-{reynolds:g}"
-                / f"m-{basis.size}-{name}.h5",
+                path,
                 recorded,
                 lambda: ReducedModel.of_scene(scene, basis, splines, projection, self.advection),
                 lambda model: eqx.filter_jit(model.project)(scene.state),
                 restore,
                 f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
                 self.progress,
-            )  # fmt: skip
+            )
         except SimulationError as error:
-            fault, run = error, error.trajectory
+            fault, run = error, read_trajectory(path)
         return self._compare(experiment, reynolds, basis, projection, tau, run, fault)
 
     def _compare(self, experiment, reynolds, basis, projection, tau, run, fault) -> Outcome:
         scene, full = self.scene(reynolds), self.full(reynolds)
         profile = probe(run, centre_line(scene.space), scene.space)
-        # the snapshots of a resumed run that failed again begin later than the full run's
-        first = int(np.argmin(np.abs(full.time - run.time[0])))
-        rows = slice(first, first + len(run.time))
-        truth = tuple(a[rows] for a in self.centre_line(reynolds))
+        truth = tuple(a[: len(run.time)] for a in self.centre_line(reynolds))
         percent = [relative_discrepancy(a, b) for a, b in zip(truth, profile, strict=True)]
         case = Case(
             scene=scene.name,
@@ -220,7 +220,7 @@ class Study:
             fom_steps=scene.steps,
             rom_steps=scene.steps if fault is None else fault.step,
             fom_compile_seconds=full.metadata["compile_seconds"],
-            rom_compile_seconds=run.metadata["compile_seconds"],
+            rom_compile_seconds=run.metadata.get("compile_seconds"),
             compression_factor=full.particles * (2 * scene.space.box.dim + 1) / basis.size,
             fault=None if fault is None else str(fault),
             fault_time=None if fault is None else fault.step * scene.time_step,

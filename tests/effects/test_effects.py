@@ -140,7 +140,7 @@ def test_operators_converge_with_their_order(dim, h_over_dx, sides):
     np.testing.assert_allclose(slopes[:3], 2.0, atol=0.2)
     # delta h c0 D acts as h^3 times a fourth derivative: it vanishes faster than the scheme's order
     assert 2.6 < slopes[3] < 3.1
-    # about (K h)^2 / 10 for a kernel of second moment h^2 n / 5 or so; 3D is coarser
+    # Measured 3.7, 3.8 and 2.2 percent in 2D, 5.2, 5.2 and 4.3 in 3D, which is coarser
     assert np.all(errors[-1][:3] < {2: 0.045, 3: 0.06}[dim])
 
 
@@ -156,11 +156,11 @@ def test_linear_fields_in_the_interior_of_a_closed_box(dim, side):
 
     moving = rates((Continuity(), PressureForce()), space, state)
     exact = -np.asarray(state.density) * np.trace(gradient)
-    # the lattice sum misses the kernel's moment by 0.3 percent in 2D and 1.2 in 3D at h = 2 dx
-    tolerance = {2: 0.01, 3: 0.03}[dim]
-    np.testing.assert_allclose(moving.density[inside], exact[inside], rtol=tolerance)
+    # Measured 0.3 and 0.4 percent: the lattice sum of (x_j - x_i) grad W V at h = 2 dx is not quite
+    # one. Pressure, 0.6 and 1.0: V = m / rho varies by a few permille over the support as well.
+    np.testing.assert_allclose(moving.density[inside], exact[inside], rtol=0.006)
     force = -(C0**2) * RHO0 * 1e-3 * slope / np.asarray(state.density)[:, None]
-    np.testing.assert_allclose(moving.velocity[inside], force[inside], rtol=tolerance)
+    np.testing.assert_allclose(moving.velocity[inside], force[inside], rtol=0.015)
 
 
 @each_dim

@@ -245,6 +245,22 @@ def test_clumping_in_mid_run_is_reported_as_overflow():
         np.testing.assert_allclose(snapshot.position, flown, atol=1e-14)  # round-off
 
 
+def test_the_list_is_rebuilt_within_an_interval_before_it_is_outrun():
+    scene = straight_flight()
+    wind = jnp.full_like(scene.state.velocity, 1.0)
+    state = eqx.tree_at(lambda s: s.velocity, scene.state, wind)
+    model = scene.model()
+    neighbors, dt = model.prepare(state), jnp.asarray(0.01)
+    ahead = eqx.tree_at(lambda s: s.position, state, state.position + 0.4 * model.search.skin)
+    same, new = (model.refresh(neighbors, s, dt) for s in (state, ahead))
+    np.testing.assert_array_equal(same.reference, state.position)
+    np.testing.assert_array_equal(new.reference, ahead.position)
+    # 0.2 m of way in one interval, many times half the skin of 0.65 dx = 0.054 m: no fault
+    flown = simulate(model, state, time_step=0.01, steps=20, steps_per_snapshot=20)
+    expected = scene.space.box.wrap(state.position + 0.2)
+    np.testing.assert_allclose(flown.position[-1], expected, atol=1e-13)  # round-off
+
+
 @pytest.mark.parametrize("row", [0, 77])
 def test_motion_beyond_the_skin_is_reported(row):
     scene = straight_flight()

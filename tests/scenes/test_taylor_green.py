@@ -61,8 +61,8 @@ def test_times_and_shapes(scene, trajectory):
 
 def test_kinetic_energy_decays_as_the_exact_solution(trajectory):
     exact = np.asarray(kinetic_energy(trajectory.time, 0.01, 1.0))
-    # 1.5 percent measured: the energy falls by 27 percent, at a rate that is up to 5 percent too
-    # high on the lattice at h = 2 dx (tests/effects)
+    # 1.5 percent measured: the energy falls by 27 percent, at a rate that is some percent
+    # too high with h = 2 dx, where the viscous sum over a lattice has a bias that stays
     np.testing.assert_allclose(energy(trajectory), exact, rtol=0.02)
     assert exact[-1] < 0.75 * exact[0]
 
