@@ -13,7 +13,7 @@ from .particles import ParticleState
 from .trajectory import Snapshot
 
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
-_MOTION_MARGIN = 1.5  # how far the next step may move a particle, over its first stage's motion
+_MOTION_MARGIN = 1.2  # how far the next step may move a particle, over its first stage's motion
 
 
 class FullModel(Model):

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional
 from jaxsph.full_model import DENSITY_BOUNDS, list_checks, refresh_list
 from jaxsph.integrate import Fault, FaultCode, Model
+from jaxsph.neighbors import CAPACITY_MARGIN
 from jaxsph.scenes import Scene
 
 from .basis import Basis
@@ -55,7 +56,7 @@ class ReducedModel(Model):
         splines: LocalSplines,
         projection: Projection,
         advection: Advection | None = None,
-        margin: float = 1.1,
+        margin: float = CAPACITY_MARGIN,
     ) -> ReducedModel:
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's."""
         advection = PaperAdvection() if advection is None else advection

@@ -11,13 +11,13 @@ from ..effects import Effect, LaminarViscosity
 from ..fluid import Fluid
 from ..full_model import FullModel
 from ..functional import SPHFunctional
-from ..neighbors import NeighborSearch
+from ..neighbors import CAPACITY_MARGIN, NeighborSearch
 from ..pairs import Space
 from ..particles import ParticleState
 
 CFL = 1.5  # dt <= CFL h / c0 (paper)
 VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
-_SKIN = 0.8  # times dx: rebuilt about every second step of the paper's settings (measured)
+_SKIN = 0.75  # times dx: rebuilt about every second step of the paper's settings (measured)
 _SKIN_PER_STEP = 3.5  # times the way of the fastest particle in a step, at least
 
 
@@ -92,7 +92,9 @@ class Scene(eqx.Module):
         """The scene's effects composed into f(w, t; mu)."""
         return SPHFunctional(self.effects, self.fluid, self.mass, self.space)
 
-    def search(self, state: ParticleState | None = None, margin: float = 1.1) -> NeighborSearch:
+    def search(
+        self, state: ParticleState | None = None, margin: float = CAPACITY_MARGIN
+    ) -> NeighborSearch:
         """Neighbour search allocated for a state (the initial one if none is given).
 
         Raises:
@@ -105,7 +107,9 @@ class Scene(eqx.Module):
             state.position, self.space.box, self.space.support, skin, margin
         )
 
-    def model(self, state: ParticleState | None = None, margin: float = 1.1) -> FullModel:
+    def model(
+        self, state: ParticleState | None = None, margin: float = CAPACITY_MARGIN
+    ) -> FullModel:
         """The full model, its neighbour list allocated for a state."""
         return FullModel(self.functional(), self.search(state, margin))
 
