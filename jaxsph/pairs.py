@@ -33,7 +33,7 @@ from .kernels import Kernel
 from .neighbors import VerletList
 from .vector import Vector
 
-_SLOTS_PER_CHUNK = 60_000  # rows times neighbour slots worked on at a time (measured)
+_SLOTS_PER_CHUNK = 40_000  # rows times neighbour slots worked on at a time (measured)
 
 
 # ------------------------------------------------------------------ what users write

@@ -16,7 +16,7 @@ from ..chunks import chunked_map
 from ..domain import Box
 from .cell_grid import CellBins, CellGrid
 
-CAPACITY_MARGIN = 1.06  # room in the list over its need at the start; every slot costs time
+CAPACITY_MARGIN = 1.1  # room in the list over its need at the start; every slot costs time
 _WORD = 32  # candidates are flagged in the bits of 32-bit words
 _BLOCK = 16_000_000  # particle-candidate pairs examined at a time
 
