@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 from jax import lax
@@ -47,6 +49,9 @@ class FullModel(Model):
             *field_checks(state, self.functional.fluid.reference_density),
             *list_checks(self.search, auxiliary, state.position),
         )
+
+    def enlarged(self):
+        return dataclasses.replace(self, search=self.search.enlarged())
 
     def observe(self, state):
         return Snapshot(

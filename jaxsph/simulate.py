@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+import warnings
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from .integrate import FaultCode, Model, SimulationError, integrate
 from .trajectory import Snapshot, Trajectory
+
+_ENLARGEMENTS = 4  # of the neighbour list in one run, together a factor of two
 
 
 class Recorder(Protocol):
@@ -41,7 +44,9 @@ def simulate(
 ) -> Trajectory:
     """Integrate a model by RK4 and return its snapshots, the first being the state given.
 
-    Run time excludes compilation: the first interval runs twice, once to compile.
+    Run time excludes compilation: the first interval runs twice, once to compile. A neighbour
+    list that overflows is allocated anew with a fifth more room, up to four times, and the run goes
+    on from its last snapshot, with a warning.
 
     Args:
         model: full or reduced.
@@ -80,7 +85,8 @@ def simulate(
             "steps": step - first_step,
             "time_step": time_step,
             "run_seconds": run_seconds,
-            "compile_seconds": max(compile_seconds, 0.0),
+            "compile_seconds": compile_seconds,
+            "enlarged_at": enlarged_at,
         }
         return Trajectory(
             time=np.asarray(times),
@@ -94,24 +100,34 @@ def simulate(
 
     if first_step == 0:
         record(0, model.observe(state))
-    start = clock.perf_counter()
-    jax.block_until_ready(_interval(model, state, np.int32(first_step), dt, steps_per_snapshot))
-    compile_seconds = clock.perf_counter() - start
-    run_seconds, step = 0.0, first_step
+    compile_seconds, run_seconds, step = 0.0, 0.0, first_step
+    compiled, enlarged_at = False, []
     while step < steps:
         start = clock.perf_counter()
-        state, fault, snapshot = jax.block_until_ready(
+        new, fault, snapshot = jax.block_until_ready(
             _interval(model, state, np.int32(step), dt, steps_per_snapshot)
         )
         elapsed = clock.perf_counter() - start
-        run_seconds += elapsed
-        if step == first_step:
-            compile_seconds -= elapsed
+        if not compiled:  # this interval runs once more, for its time without compilation
+            compiled, compile_seconds = True, compile_seconds + elapsed
+            continue
+        if int(fault.code) == FaultCode.NEIGHBOR_OVERFLOW and len(enlarged_at) < _ENLARGEMENTS:
+            larger = model.enlarged()
+            if larger is not None:
+                warnings.warn(
+                    f"step {int(fault.step)}: a particle has more neighbours than the list holds; "
+                    f"allocated it anew with more room and went on from step {step}.",
+                    stacklevel=2,
+                )
+                model, compiled = larger, False
+                enlarged_at.append(int(fault.step))
+                continue
         if int(fault.code) != FaultCode.NONE:
             error = SimulationError(fault, time_step)
             error.trajectory = trajectory() if records else None
             raise error
-        step += steps_per_snapshot
+        run_seconds += elapsed
+        state, step = new, step + steps_per_snapshot
         record(step, snapshot)
         if progress is not None:
             progress(steps_per_snapshot)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 from jax import lax
@@ -146,6 +148,9 @@ class ReducedModel(Model):
             *list_checks(self.search, auxiliary, position),
             (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(position), -1),
         )
+
+    def enlarged(self):
+        return dataclasses.replace(self, search=self.search.enlarged())
 
     def observe(self, state):
         full = self.reconstruct(state)

@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import jax
@@ -116,7 +117,8 @@ def test_existing_trajectory_is_kept(capsys):
     assert read_checkpoint("out/taylor-green/trajectory.h5").complete
 
 
-def test_fault_in_mid_run_then_resumed(capsys):
+def test_fault_in_mid_run_then_resumed(capsys, monkeypatch):
+    monkeypatch.setattr(jaxsph.FullModel, "enlarged", lambda self: None)
     # a list without spare room: the lattice fits, what it turns into does not
     assert main([*TINY, "--capacity-margin", "1", "--out", "run"]) == 1
     error = last_line(capsys)
@@ -130,6 +132,27 @@ def test_fault_in_mid_run_then_resumed(capsys):
     np.testing.assert_array_equal(resumed.position[: len(read.time)], read.position)
     assert resumed.time[-1] == pytest.approx(0.1)
     assert resumed.metadata["resumed_from_step"] == round(read.time[-1] / 0.01)
+
+
+def test_a_full_neighbor_list_is_enlarged_and_the_run_goes_on():
+    """The same flow with a list that fits from the start: enlarging changes nothing else."""
+    scene = taylor_green(16, arrangement=Lattice(), end_time=0.1)
+    runs = []
+    for margin in (1.0, 2.0):
+        steps = dict(time_step=scene.time_step, steps=scene.steps)
+        model = scene.model(margin=margin)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            runs.append(
+                jaxsph.simulate(
+                    model, scene.state, **steps, steps_per_snapshot=scene.steps_per_snapshot
+                )
+            )
+        told = [w for w in caught if "allocated it anew" in str(w.message)]
+        assert len(told) == len(runs[-1].metadata["enlarged_at"])
+    assert runs[0].metadata["enlarged_at"] and not runs[1].metadata["enlarged_at"]
+    # the same neighbours in the same order: sums differ by round-off at most
+    np.testing.assert_allclose(runs[0].position, runs[1].position, atol=1e-12)
 
 
 def test_fault_keeps_all_snapshots_before_it(tmp_path):

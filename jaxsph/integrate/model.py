@@ -36,6 +36,10 @@ class Model(eqx.Module):
     def inspect(self, step: Array, state: Any, auxiliary: Any) -> Fault:
         """What is wrong with a step's result, if anything."""
 
+    def enlarged(self) -> Model | None:
+        """The same model with more room for neighbours, or None if there is nothing to enlarge."""
+        return None
+
     @abc.abstractmethod
     def observe(self, state: Any) -> Snapshot:
         """The particle fields to record."""

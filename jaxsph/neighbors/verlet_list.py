@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import partial
 
 import equinox as eqx
@@ -16,7 +17,7 @@ from ..chunks import chunked_map
 from ..domain import Box
 from .cell_grid import CellBins, CellGrid
 
-CAPACITY_MARGIN = 1.1  # room in the list over its need at the start; every slot costs time
+CAPACITY_MARGIN = 1.15  # room in the list over its need at the start; every slot costs time
 _WORD = 32  # candidates are flagged in the bits of 32-bit words
 _BLOCK = 16_000_000  # particle-candidate pairs examined at a time
 
@@ -106,6 +107,14 @@ class NeighborSearch:
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
         return cls(grid, support, skin, capacity, cell_capacity)
+
+    def enlarged(self) -> NeighborSearch:
+        """The same search with a fifth more room."""
+        return replace(
+            self,
+            capacity=math.ceil(1.2 * self.capacity),
+            cell_capacity=math.ceil(1.2 * self.cell_capacity),
+        )
 
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
         """The list of all neighbours within support + skin of each particle, inside jit."""

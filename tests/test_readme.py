@@ -1,0 +1,22 @@
+"""What the README shows runs as it stands."""
+
+import re
+from pathlib import Path
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def test_the_python_example_runs(capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    exec(compile(code, "README.md", "exec"), {})
+    shown = capsys.readouterr().out
+    assert "LaminarViscosity" in shown and "576, 2" in shown
+    assert float(shown.split()[-1]) < 0.0  # viscosity takes energy from the flow
+
+
+def test_its_commands_are_the_ones_that_ci_runs():
+    text = README.read_text()
+    assert "python -m pip install -e . && jaxsph-rom run taylor-green" in text
+    assert 'python -m pip install -e ".[test]" && python -m pytest' in text
+    ci = (README.parent / ".ci" / "run").read_text()
+    assert 'python -m pip install -e ".[test]" && python -m pytest' in ci
