@@ -15,7 +15,7 @@ from .particles import ParticleState
 from .trajectory import Snapshot
 
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
-_MOTION_MARGIN = 1.2  # how far the next step may move a particle, over its first stage's motion
+SHIFT_SHARE = 0.5  # of the reference speed: the limit of the shift velocity
 
 
 class FullModel(Model):
@@ -34,6 +34,7 @@ class FullModel(Model):
 
     def refresh(self, auxiliary, state, time_step):
         speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        speed = speed + SHIFT_SHARE * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
     def rates(self, time, state, auxiliary):
@@ -63,9 +64,9 @@ class FullModel(Model):
 
 
 def refresh_list(search, neighbors: VerletList, position, motion) -> VerletList:
-    """The list, rebuilt if particles that move on by about `motion` [m] would outrun its skin."""
+    """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
     moved = neighbors.largest_motion(search.grid.box, position)[0]
-    outdated = moved + _MOTION_MARGIN * lax.stop_gradient(motion) > 0.5 * search.skin
+    outdated = moved + lax.stop_gradient(motion) > 0.5 * search.skin
     return lax.cond(outdated, search.build, lambda _: neighbors, position)
 
 

@@ -10,7 +10,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional
-from jaxsph.full_model import DENSITY_BOUNDS, list_checks, refresh_list
+from jaxsph.full_model import DENSITY_BOUNDS, SHIFT_SHARE, list_checks, refresh_list
 from jaxsph.integrate import Fault, FaultCode, Model
 from jaxsph.neighbors import CAPACITY_MARGIN
 from jaxsph.scenes import Scene
@@ -108,7 +108,7 @@ class ReducedModel(Model):
         return self.search.build(state.position)
 
     def refresh(self, auxiliary, state, time_step):
-        speed = self.functional.fluid.reference_speed
+        speed = (1.0 + SHIFT_SHARE) * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
     def rates(self, time, state, auxiliary):

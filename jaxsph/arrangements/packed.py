@@ -71,7 +71,7 @@ class Packed(Arrangement):
         def step(carry):
             position, velocity, neighbors, _, count = carry
             speed = jnp.sqrt(jnp.max(jnp.sum(velocity**2, axis=1)))
-            neighbors = refresh_list(search, neighbors, position, speed * _STEP * dx)
+            neighbors = refresh_list(search, neighbors, position, 1.5 * speed * _STEP * dx)
             fields = {"position": neighbors.sort(position), "volume": volume}
             force = neighbors.unsort(pair_sum(_TERMS, fields, space, neighbors)["volume_gradient"])
             # unit packing speed sqrt(beta): times are lengths
