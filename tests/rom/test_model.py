@@ -79,7 +79,6 @@ def test_a_full_basis_reproduces_the_full_models_rates(scene, disturbed, advecti
     shift = expected.position - disturbed.velocity
     carrier = disturbed.velocity + (shift if isinstance(advection, ConsistentAdvection) else 0.0)
     density, velocity = dense_advection(scene, disturbed, carrier)
-    ratio = 1.0
     if isinstance(advection, ConsistentAdvection):
         # the shift part of the momentum advection carries the factor rho0 / rho of the scheme
         _, whole = dense_advection(scene, disturbed, shift)
@@ -189,7 +188,6 @@ def test_the_pseudo_inverse_is_weighted_least_squares():
 
 @pytest.fixture(scope="module")
 def trained():
-    # h = 4 dx, the paper's: at 2 dx the advection sums are too noisy for a close comparison
     scene = taylor_green(24, 50.0, h_over_dx=2.5, end_time=0.2)
     run = jaxsph.run_scene(scene)
     reference = ReferenceSpace(scene.state.position, scene.space)
