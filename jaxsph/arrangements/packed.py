@@ -66,7 +66,8 @@ class Packed(Arrangement):
             return dx * jnp.sqrt(jnp.mean(jnp.sum(force**2, axis=1)))
 
         def unfinished(carry):
-            return (carry[-2] > self.tolerance) & (carry[-1] < self.iterations)
+            usable = ~carry[2].overflow  # stop at a list that overflows, so that it is seen
+            return usable & (carry[-2] > self.tolerance) & (carry[-1] < self.iterations)
 
         def step(carry):
             position, velocity, neighbors, _, count = carry
