@@ -6,6 +6,7 @@ from .basis import Euclidean as Euclidean
 from .basis import InnerProduct as InnerProduct
 from .basis import cumulative_energy as cumulative_energy
 from .basis import pod as pod
+from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
 from .field_advection import PaperAdvection as PaperAdvection
 from .model import ReducedModel as ReducedModel
@@ -17,4 +18,5 @@ from .reference import ReferenceSpace as ReferenceSpace
 from .reference import lagrangian_snapshots as lagrangian_snapshots
 from .splines import LocalSplines as LocalSplines
 from .study import Experiment as Experiment
+from .study import LocalBases as LocalBases
 from .study import Study as Study

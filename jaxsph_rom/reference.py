@@ -44,14 +44,13 @@ class ReferenceSpace(eqx.Module):
         Raises:
             ValueError: if particles have clumped so that a cell is overfull.
         """
-        compose = eqx.filter_jit(lambda space, x, f: space.compose(x, f))
         out = np.empty(
             (self.points.shape[0], 1 + self.space.box.dim, len(trajectory.time)),
             trajectory.density.dtype,
         )
         for k in range(len(trajectory.time)):
             density, velocity = trajectory.density[k][:, None], trajectory.velocity[k]
-            fields, overflow = compose(
+            fields, overflow = _compose(
                 self, trajectory.position[k], np.concatenate([density, velocity], axis=1)
             )
             if bool(overflow):
@@ -61,3 +60,8 @@ class ReferenceSpace(eqx.Module):
                 )
             out[:, :, k] = np.asarray(fields)
         return out
+
+
+@eqx.filter_jit
+def _compose(space: ReferenceSpace, position, fields):
+    return space.compose(position, fields)

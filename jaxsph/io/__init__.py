@@ -1,5 +1,6 @@
 """Files: trajectories in HDF5."""
 
+from .snapshot_blocks import snapshot_blocks as snapshot_blocks
 from .trajectory_file import Checkpoint as Checkpoint
 from .trajectory_file import TrajectoryFileError as TrajectoryFileError
 from .trajectory_file import read_checkpoint as read_checkpoint

@@ -67,7 +67,7 @@ class _Damaged(TrajectoryFileError):
     """What is there cannot be made out."""
 
 
-def _patient(read):
+def patient(read):
     """A file that grows can look damaged for a moment; read it a few times before giving up."""
 
     @functools.wraps(read)
@@ -82,7 +82,7 @@ def _patient(read):
     return attempt
 
 
-@_patient
+@patient
 def read_trajectory(path: str | os.PathLike) -> Trajectory:
     """The trajectory in a file, as far as its run has come, with the metadata it was run with.
 
@@ -101,7 +101,7 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
         return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
 
 
-@_patient
+@patient
 def read_checkpoint(path: str | os.PathLike) -> Checkpoint:
     """What a file says of its run, and the particles of its last snapshot.
 
