@@ -16,6 +16,8 @@ from .integrate import SimulationError as SimulationError
 from .neighbors import CellGrid as CellGrid
 from .neighbors import NeighborSearch as NeighborSearch
 from .neighbors import VerletList as VerletList
+from .neighbors import WalledSearch as WalledSearch
+from .neighbors import WallList as WallList
 from .pairs import PairTerm as PairTerm
 from .pairs import Space as Space
 from .pairs import pair_sum as pair_sum
@@ -24,3 +26,8 @@ from .simulate import run_scene as run_scene
 from .simulate import simulate as simulate
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
+from .walls import BoxRegion as BoxRegion
+from .walls import MovingWall as MovingWall
+from .walls import Region as Region
+from .walls import SignedDistance as SignedDistance
+from .walls import Walls as Walls

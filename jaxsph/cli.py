@@ -28,7 +28,6 @@ from .io import (
     read_checkpoint,
 )
 from .metrics import kinetic_energy
-from .neighbors import CAPACITY_MARGIN
 from .scenes import SCENES, Scene
 from .scenes import taylor_green_solution as taylor_green_exact
 from .scenes.record import scene_from_record
@@ -51,7 +50,7 @@ _SCENE_OPTIONS = {
 }
 
 
-_MARGIN_HELP = "room in the neighbour list over its need at the start (default: %(default)s)"
+_MARGIN_HELP = "room in the neighbour list over its need at the start (default: the scene's)"
 
 
 class Parser(argparse.ArgumentParser):
@@ -143,7 +142,7 @@ def _parser() -> Parser:
     add("--arrangement", choices=tuple(ARRANGEMENTS), help="how particles start (default: packed)")
     add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
     add("--precision", choices=("float32", "float64"), help="default: float64")
-    add("--capacity-margin", type=margin, default=CAPACITY_MARGIN, metavar="X", help=_MARGIN_HELP)
+    add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder for trajectory.h5 (default: out/SCENE)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
     add("--overwrite", action="store_true", help="replace a trajectory.h5 that is there")

@@ -10,9 +10,10 @@ from jax import lax
 
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
-from .neighbors import NeighborSearch, VerletList
+from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
 from .particles import ParticleState
 from .trajectory import Snapshot
+from .walls import Walls
 
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
 SHIFT_SHARE = 0.5  # of the reference speed: the limit of the shift velocity
@@ -23,11 +24,11 @@ class FullModel(Model):
 
     Args:
         functional: the right-hand side.
-        search: capacities of its neighbour list (static).
+        search: capacities of its neighbour list.
     """
 
     functional: SPHFunctional
-    search: NeighborSearch = eqx.field(static=True)
+    search: NeighborSearch | WalledSearch
 
     def prepare(self, state: ParticleState) -> VerletList:
         return self.search.build(state.position)
@@ -48,6 +49,7 @@ class FullModel(Model):
         return Fault.first_of(
             step,
             *field_checks(state, self.functional.fluid.reference_density),
+            *wall_checks(self.functional.walls, state.position),
             *list_checks(self.search, auxiliary, state.position),
         )
 
@@ -63,20 +65,28 @@ class FullModel(Model):
         )
 
 
-def refresh_list(search, neighbors: VerletList, position, motion) -> VerletList:
+def refresh_list(search, neighbors: VerletList | WallList, position, motion):
     """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
-    moved = neighbors.largest_motion(search.grid.box, position)[0]
+    moved = neighbors.largest_motion(search.box, position)[0]
     outdated = moved + lax.stop_gradient(motion) > 0.5 * search.skin
-    return lax.cond(outdated, search.build, lambda _: neighbors, position)
+    return lax.cond(outdated, lambda x: search.build(x), lambda _: neighbors, position)
 
 
-def list_checks(search, neighbors: VerletList, position):
+def list_checks(search, neighbors: VerletList | WallList, position):
     """Checks that no neighbour was missed: capacities, and motion within the skin."""
-    moved, particle = neighbors.largest_motion(search.grid.box, position)
+    moved, particle = neighbors.largest_motion(search.box, position)
     return (
         (FaultCode.NEIGHBOR_OVERFLOW, neighbors.overflow, -1),
         (FaultCode.NEIGHBORS_OUTDATED, moved > 0.5 * search.skin, particle),
     )
+
+
+def wall_checks(walls: Walls | None, position):
+    """The check that no particle has gone through a wall, where there are walls."""
+    if walls is None:
+        return ()
+    beyond = walls.beyond(lax.stop_gradient(position))
+    return ((FaultCode.BEYOND_WALL, jnp.any(beyond), jnp.argmax(beyond)),)
 
 
 def field_checks(state: ParticleState, reference_density):

@@ -9,33 +9,44 @@ from jaxtyping import Array, Float
 
 from .effects import Context, Effect
 from .fluid import Fluid
-from .neighbors import VerletList
+from .neighbors import VerletList, WallList
 from .pairs import Space, pair_sum
 from .particles import ParticleState
+from .wall_sums import ghost_sums, wall_sums
+from .walls import Walls
 
 
 class SPHFunctional(eqx.Module):
     """dw/dt = f(w, t; mu) for w = (position, velocity, density), the sum of the scene's effects.
 
-    It holds the sums that its effects ask for and no others, in at most two passes over the
-    pairs. Particles always move with their velocity; all else is an effect.
+    It holds the sums that its effects ask for and no others: two passes over the pairs at most,
+    and where there are walls one over the ghosts before these. Particles always move with their
+    velocity; all else is an effect.
 
     Args:
         effects: in the order in which their rates are added.
         fluid: reference density, sound speed, equation of state.
         mass: of a particle [kg].
         space: box, kernel, smoothing length and spacing (static).
+        walls: ghost particles, if the scene has walls.
     """
 
     effects: tuple[Effect, ...]
     fluid: Fluid
     mass: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     space: Space = eqx.field(static=True)
+    walls: Walls | None = None
 
     def __call__(
-        self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList
+        self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> ParticleState:
-        """Rates of change of a state; state and rates in the particles' own order."""
+        """Rates of change of a state; state and rates in the particles' own order.
+
+        Args:
+            time: [s].
+            state: the particles.
+            neighbors: a `WallList` where there are walls, else a `VerletList`.
+        """
         state = jax.tree.map(neighbors.sort, state)
         context = Context(time, self.fluid, self.mass, self.space)
         fields = {
@@ -45,18 +56,14 @@ class SPHFunctional(eqx.Module):
             "pressure": self.fluid.pressure(state.density),
             "volume": self.mass / state.density,
         }
-        terms = tuple(t for e in self.effects for t in e.geometry_terms(self.space))
-        if terms:
-            with jax.named_scope("geometry_pass"):
-                sums = pair_sum(terms, fields, self.space, neighbors)
-            for effect in self.effects:
-                with jax.named_scope(effect.name):
-                    fields = fields | effect.fields(context, fields, sums)
-        terms = tuple(t for e in self.effects for t in e.rate_terms(self.space))
-        sums = {}
-        if terms:
-            with jax.named_scope("rate_pass"):
-                sums = pair_sum(terms, fields, self.space, neighbors)
+        ghosts = {} if self.walls is None else self._ghosts(context, fields, neighbors)
+        with jax.named_scope("geometry_pass"):
+            sums = self._sums("geometry_terms", fields, ghosts, neighbors)
+        for effect in self.effects if sums else ():
+            with jax.named_scope(effect.name):
+                fields = fields | effect.fields(context, fields, sums)
+        with jax.named_scope("rate_pass"):
+            sums = self._sums("rate_terms", fields, ghosts, neighbors)
         rates = {
             "position": state.velocity,
             "velocity": jnp.zeros_like(state.velocity),
@@ -67,3 +74,32 @@ class SPHFunctional(eqx.Module):
                 for name, rate in effect.rates(context, fields, sums).items():
                     rates[name] = rates[name] + rate
         return jax.tree.map(neighbors.unsort, ParticleState(**rates))
+
+    def _sums(self, kind: str, fields, ghosts, neighbors) -> dict[str, Array]:
+        """The effects' sums of one pass, over particles and over ghosts."""
+        terms = tuple(t for e in self.effects for t in getattr(e, kind)(self.space))
+        if not terms:
+            return {}
+        if self.walls is None:
+            return pair_sum(terms, fields, self.space, neighbors)
+        sums = pair_sum(terms, fields, self.space, neighbors.fluid)
+        terms = tuple(t for e in self.effects for t in getattr(e, f"wall_{kind}")(self.space))
+        with jax.named_scope("walls"):
+            added = wall_sums(terms, fields, ghosts, self.space, neighbors.wall)
+        return {name: s + added[name] if name in added else s for name, s in sums.items()}
+
+    def _ghosts(self, context, fields, neighbors: WallList) -> dict[str, Array]:
+        """Fields of the ghosts, as the wall effects give them."""
+        walls, order = self.walls, neighbors.wall.ghosts
+        ghosts = {
+            "position": walls.position[order],
+            "normal": walls.normal[order],
+            "wall_velocity": walls.velocity[order],
+        }
+        terms = tuple(t for e in self.effects for t in e.ghost_terms(self.space))
+        with jax.named_scope("ghost_pass"):
+            sums = ghost_sums(terms, fields, ghosts, self.space, neighbors.wall)
+        for effect in self.effects:
+            with jax.named_scope(effect.name):
+                ghosts = ghosts | effect.ghost_fields(context, ghosts, sums)
+        return ghosts

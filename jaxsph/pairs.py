@@ -30,7 +30,7 @@ from jaxtyping import Array
 from .chunks import chunked_map
 from .domain import Box
 from .kernels import Kernel
-from .neighbors import VerletList
+from .neighbors import VerletList, WallPairs
 from .vector import Vector
 
 _SLOTS_PER_CHUNK = 40_000  # rows times neighbour slots worked on at a time (measured)
@@ -130,7 +130,8 @@ def pair_sum(
     terms: tuple[PairTerm, ...],
     fields: Mapping[str, Array],
     space: Space,
-    neighbors: VerletList,
+    neighbors: VerletList | WallPairs,
+    rows: tuple[int, int] | None = None,
 ) -> dict[str, Array]:
     """All sums of `terms` in one pass over the pairs.
 
@@ -139,10 +140,12 @@ def pair_sum(
         fields: per-particle arrays (N,) or (N, k) in the list's sorted order; `position` and
             `volume` among them.
         space: kernel and box.
-        neighbors: the list.
+        neighbors: the list; symmetric, so that sums can be transposed.
+        rows: first row wanted and the one past the last; all if none are given.
 
     Returns:
-        for each term's name an array (N,), or (N, k) where the term gives a vector.
+        for each term's name an array (N,), or (N, k) where the term gives a vector, N counting the
+        rows wanted.
 
     Raises:
         ValueError: if two different terms share a name, or a field is missing.
@@ -162,7 +165,7 @@ def pair_sum(
     for name, width in layout:
         columns += [fields[name][:, k] for k in range(width)] if width else [fields[name]]
     function = _Composed(terms, space, layout)
-    outputs = pair_sum_p.bind(neighbors.index, *columns, function=function)
+    outputs = pair_sum_p.bind(neighbors.index, *columns, function=function, rows=rows)
     sums, start = {}, 0
     for term, width in zip(terms, function.widths(columns[0].dtype), strict=True):
         if width:
@@ -271,12 +274,13 @@ pair_sum_p = Primitive("pair_sum")
 pair_sum_p.multiple_results = True
 
 
-def _evaluate(index, *columns, function):
+def _evaluate(index, *columns, function, rows):
     """Gather rows of all columns at once, reduce all sums in one loop."""
     table = jnp.stack(columns, axis=-1)
     width = len(columns)
+    wanted = slice(*(rows or (None,)))
 
-    def rows(block):
+    def sums(block):
         here, neighbors = block
         there = table.at[neighbors].get(mode="promise_in_bounds")
         shape = neighbors.shape
@@ -288,27 +292,29 @@ def _evaluate(index, *columns, function):
             tuple(values), zeros, lambda a, b: tuple(x + y for x, y in zip(a, b, strict=True)), (1,)
         )
 
-    return list(chunked_map(rows, (table, index), max(1, _SLOTS_PER_CHUNK // index.shape[1])))
+    chunk = max(1, _SLOTS_PER_CHUNK // index.shape[1])
+    return list(chunked_map(sums, (table[wanted], index[wanted]), chunk))
 
 
-def _abstract(index, *columns, function):
+def _abstract(index, *columns, function, rows):
     probe = [jax.ShapeDtypeStruct((1, 1), c.dtype) for c in columns]
     outputs = jax.eval_shape(lambda *c: function(c, c), *probe)
-    return [jax.core.ShapedArray((columns[0].shape[0],), o.dtype) for o in outputs]
+    count = columns[0].shape[0] if rows is None else rows[1] - rows[0]
+    return [jax.core.ShapedArray((count,), o.dtype) for o in outputs]
 
 
-def _jvp(primals, tangents, *, function):
+def _jvp(primals, tangents, *, function, rows):
     index, *columns = primals
     active = tuple(k for k, t in enumerate(tangents[1:]) if type(t) is not ad.Zero)
-    outputs = pair_sum_p.bind(*primals, function=function)
+    outputs = pair_sum_p.bind(*primals, function=function, rows=rows)
     if not active:
         return outputs, [ad.Zero.from_primal_value(o) for o in outputs]
     linear = _Linearised(function, active, len(columns))
     moved = [tangents[1 + k] for k in active]
-    return outputs, pair_sum_p.bind(index, *columns, *moved, function=linear)
+    return outputs, pair_sum_p.bind(index, *columns, *moved, function=linear, rows=rows)
 
 
-def _transpose(cotangents, index, *columns, function):
+def _transpose(cotangents, index, *columns, function, rows):
     primals = columns[: function.count]
     linear = columns[function.count :]
     if any(map(ad.is_undefined_primal, primals)) or not all(map(ad.is_undefined_primal, linear)):
@@ -318,25 +324,29 @@ def _transpose(cotangents, index, *columns, function):
     else:
         flipped = _Linearised(function.function, function.active, function.count)
     cotangents = [ad.instantiate_zeros(c) for c in cotangents]
-    outputs = pair_sum_p.bind(index, *primals, *cotangents, function=flipped)
+    if rows is not None:  # a sum that was not wanted has no cotangent
+        beyond = (rows[0], index.shape[0] - rows[1])
+        cotangents = [jnp.pad(c, beyond) for c in cotangents]
+    outputs = pair_sum_p.bind(index, *primals, *cotangents, function=flipped, rows=None)
     return [None] * (1 + len(primals)) + list(outputs)
 
 
-def _batch(arguments, axes, *, function):
+def _batch(arguments, axes, *, function, rows):
     moved = [
         a if axis is None else jnp.moveaxis(a, axis, 0)
         for a, axis in zip(arguments, axes, strict=True)
     ]
     mapped = [k for k, axis in enumerate(axes) if axis is not None]
 
-    def member(rows):
-        return tuple(pair_sum_p.bind(*_replace(moved, mapped, rows), function=function))
+    def member(own):
+        arguments = _replace(moved, mapped, own)
+        return tuple(pair_sum_p.bind(*arguments, function=function, rows=rows))
 
     outputs = lax.map(member, [moved[k] for k in mapped])
     return list(outputs), [0] * len(outputs)
 
 
-pair_sum_p.def_impl(jax.jit(_evaluate, static_argnames="function"))
+pair_sum_p.def_impl(jax.jit(_evaluate, static_argnames=("function", "rows")))
 pair_sum_p.def_abstract_eval(_abstract)
 mlir.register_lowering(pair_sum_p, mlir.lower_fun(_evaluate, multiple_results=True))
 ad.primitive_jvps[pair_sum_p] = _jvp

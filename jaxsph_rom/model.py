@@ -9,10 +9,15 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
-from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional
-from jaxsph.full_model import DENSITY_BOUNDS, SHIFT_SHARE, list_checks, refresh_list
+from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional, WalledSearch
+from jaxsph.full_model import (
+    DENSITY_BOUNDS,
+    SHIFT_SHARE,
+    list_checks,
+    refresh_list,
+    wall_checks,
+)
 from jaxsph.integrate import Fault, FaultCode, Model
-from jaxsph.neighbors import CAPACITY_MARGIN
 from jaxsph.scenes import Scene
 
 from .basis import Basis
@@ -41,14 +46,14 @@ class ReducedModel(Model):
         projection: `Galerkin()` or `AdjointPetrovGalerkin(tau)`.
         splines: of all modes, functions ordered (field, mode).
         basis: the modes at the reference points, with centre and inner product.
-        search: neighbour search (static).
+        search: neighbour search.
     """
 
     functional: SPHFunctional
     projection: Projection
     splines: LocalSplines
     basis: Basis
-    search: NeighborSearch = eqx.field(static=True)
+    search: NeighborSearch | WalledSearch
 
     @classmethod
     def of_scene(
@@ -58,7 +63,7 @@ class ReducedModel(Model):
         splines: LocalSplines,
         projection: Projection,
         advection: Advection | None = None,
-        margin: float = CAPACITY_MARGIN,
+        margin: float | None = None,
     ) -> ReducedModel:
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's."""
         advection = PaperAdvection() if advection is None else advection
@@ -145,6 +150,7 @@ class ReducedModel(Model):
             (FaultCode.NOT_FINITE, lost, -1),
             (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
             (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), -1),
+            *wall_checks(self.functional.walls, position),
             *list_checks(self.search, auxiliary, position),
             (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(position), -1),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -20,12 +21,30 @@ class Context(NamedTuple):
     space: Space
 
 
+class WallTerm(NamedTuple):
+    """What ghosts add to the sum of that name: `function(pair, i, j)` for particle i and ghost j.
+
+    `reads` names fields of the particle, `ghost_reads` those of the ghost. Positions, volumes,
+    normals and wall velocities are always there; the scene's wall effects give the others.
+    """
+
+    name: str
+    reads: tuple[str, ...]
+    ghost_reads: tuple[str, ...]
+    function: Callable
+
+
 class Effect(eqx.Module):
     """A part of the SPH functional, in at most two passes over the pairs.
 
     The first pass sees positions, densities, pressures, volumes and velocities; what an effect
     makes of its sums (`fields`) is there for the second pass, whose sums become rates of change of
     position [m/s], velocity [m/s^2] and density [kg/m^3/s].
+
+    Where a scene has walls, a pass over the ghosts comes first: its sums over fluid particles
+    (`ghost_terms`) give the ghosts their values (`ghost_fields`); and in both other passes ghosts
+    add to the sums what an effect's `wall_geometry_terms` and `wall_rate_terms` say. Without walls
+    none of these is called.
 
     Coefficients that one may sweep or differentiate are array fields; what changes the structure
     of the computation is static.
@@ -46,6 +65,22 @@ class Effect(eqx.Module):
 
     def rate_terms(self, space: Space) -> tuple[PairTerm, ...]:
         """Sums wanted of the second pass."""
+        return ()
+
+    def ghost_terms(self, space: Space) -> tuple[PairTerm, ...]:
+        """Sums wanted for each ghost i over the fluid particles j near it."""
+        return ()
+
+    def ghost_fields(self, context: Context, ghosts: dict, sums: dict) -> dict[str, Array]:
+        """New fields of the ghosts made of these sums."""
+        return {}
+
+    def wall_geometry_terms(self, space: Space) -> tuple[WallTerm, ...]:
+        """What ghosts add to sums of the first pass."""
+        return ()
+
+    def wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
+        """What ghosts add to sums of the second pass."""
         return ()
 
     def rates(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:

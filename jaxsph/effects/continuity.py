@@ -1,7 +1,7 @@
 """Conservation of mass."""
 
 from ..pairs import PairTerm
-from .base import Effect
+from .base import Effect, WallTerm
 
 
 def velocity_divergence(pair, i, j):
@@ -9,14 +9,28 @@ def velocity_divergence(pair, i, j):
     return (j.velocity - i.velocity).dot(pair.gradient)
 
 
+def reflected_divergence(pair, i, j):
+    """-2 (u_i . n_j) (n_j . grad_i W_ij) V_j"""
+    return i.velocity.dot(j.normal) * j.normal.dot(pair.gradient) * -2.0
+
+
 VELOCITY_DIVERGENCE = PairTerm("velocity_divergence", ("velocity",), velocity_divergence)
+WALL_DIVERGENCE = WallTerm("velocity_divergence", ("velocity",), ("normal",), reflected_divergence)
 
 
 class Continuity(Effect):
-    """drho_i/dt = -rho_i sum_j (u_j - u_i) . grad_i W_ij V_j (paper, continuity, first sum)."""
+    """drho_i/dt = -rho_i sum_j (u_j - u_i) . grad_i W_ij V_j (paper, continuity, first sum).
+
+    At a wall of normal n a ghost answers each particle with the particle's own velocity, its normal
+    part reversed: u_j - u_i = -2 (u_i . n) n. Extrapolated ghost velocities would carry the change
+    of a lid's speed along the wall as a divergence, and the lid would suck particles in.
+    """
 
     def rate_terms(self, space):
         return (VELOCITY_DIVERGENCE,)
+
+    def wall_rate_terms(self, space):
+        return (WALL_DIVERGENCE,)
 
     def rates(self, context, fields, sums):
         return {"density": -fields["density"] * sums["velocity_divergence"]}

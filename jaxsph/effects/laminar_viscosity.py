@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
-from .base import Effect
+from .base import Effect, WallTerm
 
 
 def viscous_sum(pair, i, j):
@@ -27,6 +27,9 @@ class LaminarViscosity(Effect):
 
     def rate_terms(self, space):
         return (PairTerm("viscous_sum", ("velocity",), viscous_sum),)
+
+    def wall_rate_terms(self, space):
+        return (WallTerm("viscous_sum", ("velocity",), ("velocity",), viscous_sum),)
 
     def rates(self, context, fields, sums):
         factor = 2.0 * (context.space.box.dim + 2) * self.viscosity

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 
 from ..pairs import PairTerm
-from .base import Effect
+from .base import Effect, WallTerm
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,10 @@ class ParticleShifting(Effect):
     """
 
     def geometry_terms(self, space):
-        weight = ShiftingSum(0.2 / space.kernel_at_spacing)
-        return (PairTerm("shifting_sum", (), weight),)
+        return (PairTerm("shifting_sum", (), _weight(space)),)
+
+    def wall_geometry_terms(self, space):
+        return (WallTerm("shifting_sum", (), (), _weight(space)),)
 
     def fields(self, context, fields, sums):
         speed = context.fluid.reference_speed  # c0 Ma
@@ -45,3 +47,7 @@ class ParticleShifting(Effect):
 
     def rates(self, context, fields, sums):
         return {"position": fields["shift_velocity"]}
+
+
+def _weight(space) -> ShiftingSum:
+    return ShiftingSum(0.2 / space.kernel_at_spacing)

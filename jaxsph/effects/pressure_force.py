@@ -1,7 +1,7 @@
 """The pressure gradient."""
 
 from ..pairs import PairTerm
-from .base import Effect
+from .base import Effect, WallTerm
 
 
 def pressure_gradient(pair, i, j):
@@ -14,6 +14,9 @@ class PressureForce(Effect):
 
     def rate_terms(self, space):
         return (PairTerm("pressure_gradient", ("pressure",), pressure_gradient),)
+
+    def wall_rate_terms(self, space):
+        return (WallTerm("pressure_gradient", ("pressure",), ("pressure",), pressure_gradient),)
 
     def rates(self, context, fields, sums):
         return {"velocity": -sums["pressure_gradient"] / fields["density"][:, None]}

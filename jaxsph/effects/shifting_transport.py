@@ -1,7 +1,7 @@
 """What density and momentum lose and gain because particles are shifted."""
 
 from ..pairs import PairTerm
-from .base import Effect
+from .base import Effect, WallTerm
 
 
 def shift_divergence(pair, i, j):
@@ -23,6 +23,25 @@ def shift_momentum_flux(pair, i, j):
     return j.velocity * there + i.velocity * here
 
 
+def reflected_shift_divergence(pair, i, j):
+    """-2 (du_i . n_j) (n_j . grad_i W_ij) V_j"""
+    return i.shift_velocity.dot(j.normal) * j.normal.dot(pair.gradient) * -2.0
+
+
+def wall_shift_mass_flux(pair, i, j):
+    """(rho_j du_j + rho_i du_i) . grad_i W_ij V_j with du_j = du_i - 2 (du_i . n_j) n_j"""
+    here = i.shift_velocity.dot(pair.gradient)
+    there = here + reflected_shift_divergence(pair, i, j)
+    return j.density * there + i.density * here
+
+
+def wall_shift_momentum_flux(pair, i, j):
+    """(u_j (x) du_j + u_i (x) du_i) . grad_i W_ij V_j with du_j as above"""
+    here = i.shift_velocity.dot(pair.gradient)
+    there = here + reflected_shift_divergence(pair, i, j)
+    return j.velocity * there + i.velocity * here
+
+
 class ShiftingTransport(Effect):
     """The shift-velocity terms of the paper's continuity and momentum equations:
 
@@ -32,7 +51,8 @@ class ShiftingTransport(Effect):
                                - u_i sum_j (du_j - du_i).grad W V_j ].
 
     Needs `ParticleShifting`, which makes the shift velocity du. The last sum is not pairwise
-    antisymmetric: with it, total momentum is conserved only to truncation.
+    antisymmetric: with it, total momentum is conserved only to truncation. At a wall the ghost's
+    shift velocity is the particle's own, its part along the wall's normal reversed.
     """
 
     def rate_terms(self, space):
@@ -40,6 +60,21 @@ class ShiftingTransport(Effect):
             PairTerm("shift_divergence", ("shift_velocity",), shift_divergence),
             PairTerm("shift_mass_flux", ("shift_velocity", "density"), shift_mass_flux),
             PairTerm("shift_momentum_flux", ("velocity", "shift_velocity"), shift_momentum_flux),
+        )
+
+    def wall_rate_terms(self, space):
+        shift = "shift_velocity"
+        return (
+            WallTerm("shift_divergence", (shift,), ("normal",), reflected_shift_divergence),
+            WallTerm(
+                "shift_mass_flux", (shift, "density"), ("normal", "density"), wall_shift_mass_flux
+            ),
+            WallTerm(
+                "shift_momentum_flux",
+                (shift, "velocity"),
+                ("normal", "velocity"),
+                wall_shift_momentum_flux,
+            ),
         )
 
     def rates(self, context, fields, sums):

@@ -18,6 +18,7 @@ class FaultCode(IntEnum):
     NEIGHBOR_OVERFLOW = 3
     NEIGHBORS_OUTDATED = 4
     SPLINE_CELL_OVERFLOW = 5
+    BEYOND_WALL = 6
 
 
 _EXPLANATIONS = {
@@ -31,6 +32,8 @@ _EXPLANATIONS = {
     "one step; use a smaller time step",
     FaultCode.SPLINE_CELL_OVERFLOW: "a cell of the reference splines holds more particles than "
     "allocated: particles have clumped; allocate with a larger margin",
+    FaultCode.BEYOND_WALL: "a particle went through a wall; use a smaller time step or a higher "
+    "resolution",
 }
 
 

@@ -1,7 +1,10 @@
-"""Fixed-capacity neighbour search: a cell grid, and the Verlet list that it fills."""
+"""Fixed-capacity neighbour search: a cell grid, and the lists that it fills."""
 
 from .cell_grid import CellBins as CellBins
 from .cell_grid import CellGrid as CellGrid
 from .verlet_list import CAPACITY_MARGIN as CAPACITY_MARGIN
 from .verlet_list import NeighborSearch as NeighborSearch
 from .verlet_list import VerletList as VerletList
+from .wall_list import WalledSearch as WalledSearch
+from .wall_list import WallList as WallList
+from .wall_list import WallPairs as WallPairs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import equinox as eqx
@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from ..chunks import chunked_map
 from ..domain import Box
@@ -57,8 +57,7 @@ class VerletList(eqx.Module):
         return (self.largest_count > self.index.shape[1]) | (self.cell_overflow > 0)
 
 
-@dataclass(frozen=True)
-class NeighborSearch:
+class NeighborSearch(eqx.Module):
     """Capacities and radii of a neighbour list; chosen outside jit, static inside it.
 
     Args:
@@ -69,11 +68,11 @@ class NeighborSearch:
         cell_capacity: particles a cell can hold.
     """
 
-    grid: CellGrid
-    support: float
-    skin: float
-    capacity: int
-    cell_capacity: int
+    grid: CellGrid = eqx.field(static=True)
+    support: float = eqx.field(static=True)
+    skin: float = eqx.field(static=True)
+    capacity: int = eqx.field(static=True)
+    cell_capacity: int = eqx.field(static=True)
 
     @classmethod
     def allocate(
@@ -108,6 +107,10 @@ class NeighborSearch:
         capacity = min(capacity, max(1, position.shape[0] - 1))
         return cls(grid, support, skin, capacity, cell_capacity)
 
+    @property
+    def box(self) -> Box:
+        return self.grid.box
+
     def enlarged(self) -> NeighborSearch:
         """The same search with a fifth more room."""
         return replace(
@@ -121,7 +124,7 @@ class NeighborSearch:
         position = lax.stop_gradient(position)
         bins, words, largest = self._flag(position)
         return VerletList(
-            index=self._pick(bins, words),
+            index=pick(words, bins.cell, self._candidates(bins), self.capacity),
             order=bins.order,
             inverse=bins.inverse.astype(jnp.int32),
             reference=position,
@@ -131,9 +134,7 @@ class NeighborSearch:
 
     def _candidates(self, bins: CellBins) -> Int[Array, "cells candidates"]:
         """Sorted places of all particles in each cell's neighbourhood, N where there is none."""
-        around = bins.members[self.grid.stencil].reshape(self.grid.cells, -1)
-        padding = -around.shape[1] % _WORD
-        return jnp.pad(around, ((0, 0), (0, padding)), constant_values=bins.order.shape[0])
+        return candidates(bins, self.grid, bins.order.shape[0])
 
     def _flag(self, position):
         """Bins, and for each particle a bit per candidate of its cell: neighbour or not."""
@@ -151,46 +152,71 @@ class NeighborSearch:
                 separation = there[:, None, :, k] - here[:, :, None, k]
                 squared = squared + self.grid.box.minimum_image(separation, k) ** 2
             near = (squared < radius_squared) & (around[:, None, :] != members[:, :, None])
-            bits = near.reshape(near.shape[:2] + (-1, _WORD)).astype(jnp.uint32)
-            bits = bits << jnp.arange(_WORD, dtype=jnp.uint32).reshape(1, 1, 1, _WORD)
-            return jnp.sum(bits, axis=-1, dtype=jnp.uint32)
+            return pack(near)
 
         chunk = max(1, _BLOCK // (self.cell_capacity * candidates.shape[1]))
         words = chunked_map(flag, (bins.members[:-1], candidates), chunk)
         words = words[bins.cell, bins.slot]
-        counts = jnp.sum(lax.population_count(words), axis=1, dtype=jnp.uint32).astype(jnp.int32)
-        return bins, words, jnp.max(counts)
+        return bins, words, jnp.max(count_bits(words))
 
-    def _pick(self, bins: CellBins, words) -> Int[Array, "particles capacity"]:
-        """Turn each particle's bits into a list: slot k holds the k-th set bit's candidate."""
-        candidates = self._candidates(bins).reshape(-1)
-        count = words.shape[1]
-        slots = jnp.arange(self.capacity, dtype=jnp.int32)[None, :]
-        along = partial(jnp.take_along_axis, axis=1, mode="promise_in_bounds")
 
-        def pick(block):
-            words, cell, own = block
-            counts = lax.population_count(words).astype(jnp.int32)
-            through = jnp.cumsum(counts, axis=1, dtype=jnp.int32)
-            before = through[:, :, None] <= slots[:, None, :]
-            word = jnp.sum(before, axis=1, dtype=jnp.int32)
-            found = word < count
-            word = jnp.minimum(word, count - 1)
-            rank = slots - along(through - counts, word)
-            bits = along(words, word)
-            bit = jnp.zeros_like(rank)
-            for half in (16, 8, 4, 2, 1):  # binary search for the rank-th set bit
-                low = bits & jnp.uint32((1 << half) - 1)
-                below = lax.population_count(low).astype(jnp.int32)
-                upper = rank >= below
-                rank = jnp.where(upper, rank - below, rank)
-                bits = jnp.where(upper, bits >> jnp.uint32(half), bits)
-                bit = jnp.where(upper, bit + half, bit)
-            place = candidates.at[(cell[:, None] * count + word) * _WORD + bit].get(
-                mode="promise_in_bounds"
-            )
-            return jnp.where(found, place, own[:, None])
+def candidates(bins: CellBins, grid: CellGrid, nothing: int) -> Int[Array, "cells candidates"]:
+    """Members of all cells around each cell, filled up with `nothing` to whole words of bits."""
+    around = bins.members[grid.stencil].reshape(grid.cells, -1)
+    padding = -around.shape[1] % _WORD
+    return jnp.pad(around, ((0, 0), (0, padding)), constant_values=nothing)
 
-        own = jnp.arange(words.shape[0], dtype=jnp.int32)
-        chunk = max(1, _BLOCK // (self.capacity * count))
-        return chunked_map(pick, (words, bins.cell, own), chunk)
+
+def pack(flags: Bool[Array, "*rows candidates"]) -> UInt32[Array, "*rows words"]:
+    """Flags as the bits of 32-bit words."""
+    bits = flags.reshape(flags.shape[:-1] + (-1, _WORD)).astype(jnp.uint32)
+    shift = jnp.arange(_WORD, dtype=jnp.uint32).reshape((1,) * flags.ndim + (_WORD,))
+    return jnp.sum(bits << shift, axis=-1, dtype=jnp.uint32)
+
+
+def count_bits(words: UInt32[Array, "rows words"]) -> Int[Array, " rows"]:
+    """Number of set bits of each row."""
+    return jnp.sum(lax.population_count(words), axis=1, dtype=jnp.uint32).astype(jnp.int32)
+
+
+def pick(
+    words: UInt32[Array, "rows words"],
+    cell: Int[Array, " rows"],
+    candidates: Int[Array, "cells candidates"],
+    capacity: int,
+    own: int = 0,
+    entry: int = 0,
+) -> Int[Array, "rows capacity"]:
+    """Each row's bits as a list: slot k holds the candidate of the k-th set bit.
+
+    A free slot holds the row's own number. Row numbers count from `own`, entries from `entry`.
+    """
+    count = words.shape[1]
+    flat = candidates.reshape(-1)
+    slots = jnp.arange(capacity, dtype=jnp.int32)[None, :]
+    along = partial(jnp.take_along_axis, axis=1, mode="promise_in_bounds")
+
+    def rows(block):
+        words, cell, row = block
+        counts = lax.population_count(words).astype(jnp.int32)
+        through = jnp.cumsum(counts, axis=1, dtype=jnp.int32)
+        before = through[:, :, None] <= slots[:, None, :]
+        word = jnp.sum(before, axis=1, dtype=jnp.int32)
+        found = word < count
+        word = jnp.minimum(word, count - 1)
+        rank = slots - along(through - counts, word)
+        bits = along(words, word)
+        bit = jnp.zeros_like(rank)
+        for half in (16, 8, 4, 2, 1):  # binary search for the rank-th set bit
+            low = bits & jnp.uint32((1 << half) - 1)
+            below = lax.population_count(low).astype(jnp.int32)
+            upper = rank >= below
+            rank = jnp.where(upper, rank - below, rank)
+            bits = jnp.where(upper, bits >> jnp.uint32(half), bits)
+            bit = jnp.where(upper, bit + half, bit)
+        place = (cell[:, None] * count + word) * _WORD + bit
+        place = flat.at[place].get(mode="promise_in_bounds")
+        return jnp.where(found, place + entry, row[:, None])
+
+    row = own + jnp.arange(words.shape[0], dtype=jnp.int32)
+    return chunked_map(rows, (words, cell, row), max(1, _BLOCK // (capacity * count)))

@@ -6,18 +6,21 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 
 from ..effects import Effect, LaminarViscosity
 from ..fluid import Fluid
 from ..full_model import FullModel
 from ..functional import SPHFunctional
-from ..neighbors import CAPACITY_MARGIN, NeighborSearch
+from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
 from ..particles import ParticleState
+from ..walls import Walls
 
 CFL = 1.5  # dt <= CFL h / c0 (paper)
 VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
 _SKIN = 0.82  # times dx: rebuilt about every second step of the paper's settings (measured)
+_WALL_MARGIN = 1.3  # times the list's need at the start: particles begin on a lattice there
 _SKIN_PER_STEP = 3.5  # times the way of the fastest particle in a step, at least
 
 
@@ -34,9 +37,11 @@ class Scene(eqx.Module):
         end_time: of the run [s].
         steps_per_snapshot: between recorded snapshots.
         parameters: what the scene was made with, JSON-like, for the record.
+        walls: around the fluid, if it has any.
 
     Raises:
-        ValueError: if the time step is beyond the stability limit or does not divide the end time.
+        ValueError: if the time step is beyond the stability limit or does not divide the end time,
+            or a particle starts inside a wall.
     """
 
     name: str = eqx.field(static=True)
@@ -48,6 +53,7 @@ class Scene(eqx.Module):
     end_time: float = eqx.field(static=True)
     steps_per_snapshot: int = eqx.field(static=True)
     parameters: dict[str, Any] = eqx.field(static=True, default_factory=dict)
+    walls: Walls | None = None
 
     def __check_init__(self):
         if self.steps_per_snapshot < 1:
@@ -58,6 +64,15 @@ class Scene(eqx.Module):
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
                 "(the lesser of 1.5 h/c0 and 0.125 h^2/nu); choose one below it."
             )
+        if self.walls is not None:
+            beyond = np.asarray(self.walls.beyond(self.state.position))
+            if beyond.any():
+                first = int(np.argmax(beyond))
+                raise ValueError(
+                    f"particles: number {first} at {np.asarray(self.state.position[first])} m and "
+                    f"{int(beyond.sum()) - 1} more start inside a wall; leave them out or move "
+                    "the wall."
+                )
         reached = self.steps * self.time_step
         if abs(reached - self.end_time) > 1e-6 * self.end_time:
             interval = self.steps_per_snapshot
@@ -90,12 +105,15 @@ class Scene(eqx.Module):
 
     def functional(self) -> SPHFunctional:
         """The scene's effects composed into f(w, t; mu)."""
-        return SPHFunctional(self.effects, self.fluid, self.mass, self.space)
+        return SPHFunctional(self.effects, self.fluid, self.mass, self.space, self.walls)
 
     def search(
-        self, state: ParticleState | None = None, margin: float = CAPACITY_MARGIN
-    ) -> NeighborSearch:
+        self, state: ParticleState | None = None, margin: float | None = None
+    ) -> NeighborSearch | WalledSearch:
         """Neighbour search allocated for a state (the initial one if none is given).
+
+        Its lists have `margin` times the room that the state needs, or what a scene without or
+        with walls is known to need.
 
         Raises:
             ValueError: if the box is too small for the kernel's support.
@@ -103,13 +121,21 @@ class Scene(eqx.Module):
         state = self.state if state is None else state
         motion = float(self.fluid.reference_speed) * self.time_step
         skin = max(_SKIN * self.space.spacing, _SKIN_PER_STEP * motion)
-        return NeighborSearch.allocate(
-            state.position, self.space.box, self.space.support, skin, margin
+        box, support = self.space.box, self.space.support
+        if self.walls is None:
+            margin = CAPACITY_MARGIN if margin is None else margin
+            return NeighborSearch.allocate(state.position, box, support, skin, margin)
+        return WalledSearch.allocate(
+            state.position,
+            self.walls.position,
+            box,
+            support,
+            skin,
+            self.space.spacing,
+            _WALL_MARGIN if margin is None else margin,
         )
 
-    def model(
-        self, state: ParticleState | None = None, margin: float = CAPACITY_MARGIN
-    ) -> FullModel:
+    def model(self, state: ParticleState | None = None, margin: float | None = None) -> FullModel:
         """The full model, its neighbour list allocated for a state."""
         return FullModel(self.functional(), self.search(state, margin))
 

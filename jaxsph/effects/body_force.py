@@ -1,0 +1,68 @@
+"""Body forces."""
+
+import abc
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .base import Effect
+
+
+class BodyForce(Effect):
+    """du_i/dt = b(t, x_i)."""
+
+    @abc.abstractmethod
+    def acceleration(
+        self, time: Float[Array, ""], position: Float[Array, "points dim"]
+    ) -> Float[Array, "points dim"]:
+        """b [m/s^2] at a time [s] and at positions [m]."""
+
+    def rates(self, context, fields, sums):
+        return {"velocity": self.acceleration(context.time, fields["position"])}
+
+
+class Gravity(BodyForce):
+    """A uniform, constant body force.
+
+    Args:
+        vector: b (n,) [m/s^2].
+    """
+
+    vector: Float[Array, " dim"] = eqx.field(converter=jnp.asarray)
+
+    def acceleration(self, time, position):
+        return jnp.broadcast_to(self.vector[None, :], position.shape)
+
+
+class KickAndHold(BodyForce):
+    """The open cavity's drive along the first axis, where `start` <= x <= `end` (paper):
+
+        b_x(t) = b0 [1 / (1 + exp(-k (f0 - t))) + k0].
+
+    As printed (f = -t) it does not ramp up: it kicks with about b0 until t = f0 and falls within
+    some 1 / k to b0 k0.
+
+    Args:
+        amplitude: b0 [m/s^2].
+        steepness: k [1/s].
+        duration: f0 [s].
+        remainder: k0, the share of b0 that stays.
+        start, end: the part of the first axis [m] where it acts.
+    """
+
+    amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    steepness: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    duration: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    remainder: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    start: float = eqx.field(static=True)
+    end: float = eqx.field(static=True)
+
+    def acceleration(self, time, position):
+        ramp = jax.nn.sigmoid(self.steepness * (self.duration - time))
+        strength = self.amplitude * (ramp + self.remainder)
+        x = position[:, 0]
+        inside = (x >= self.start) & (x <= self.end)
+        force = jnp.zeros_like(position)
+        return force.at[:, 0].set(jnp.where(inside, strength, jnp.zeros((), position.dtype)))

@@ -1,0 +1,61 @@
+"""The pressure and density of ghosts."""
+
+import jax.numpy as jnp
+
+from ..pairs import PairTerm
+from .base import Effect
+from .body_force import BodyForce
+
+
+def ghost_weight(pair, i, j):
+    """W_ij"""
+    return pair.kernel
+
+
+def ghost_pressure(pair, i, j):
+    """p_j W_ij"""
+    return j.pressure * pair.kernel
+
+
+def ghost_moment(pair, i, j):
+    """rho_j (x_i - x_j) W_ij"""
+    return pair.separation * (-j.density * pair.kernel)
+
+
+GHOST_WEIGHT = PairTerm("ghost_weight", (), ghost_weight)
+
+
+class WallPressure(Effect):
+    """Ghost i takes its pressure from the fluid particles j (Adami et al. 2012, eq. 27; paper):
+
+        p_i = [sum_j p_j W_ij + b . sum_j rho_j (x_i - x_j) W_ij] / sum_j W_ij,
+
+    its density from the equation of state, and its volume from that. b is the body force [m/s^2]
+    at the ghost; without one its sum is not computed. A ghost out of reach of the fluid has p = 0.
+
+    Args:
+        force: the scene's body force, if it has one.
+    """
+
+    force: BodyForce | None = None
+
+    def ghost_terms(self, space):
+        terms = (GHOST_WEIGHT, PairTerm("ghost_pressure", ("pressure",), ghost_pressure))
+        if self.force is not None:
+            terms += (PairTerm("ghost_moment", ("density",), ghost_moment),)
+        return terms
+
+    def ghost_fields(self, context, ghosts, sums):
+        pressure = sums["ghost_pressure"]
+        if self.force is not None:
+            acceleration = self.force.acceleration(context.time, ghosts["position"])
+            pressure = pressure + jnp.sum(acceleration * sums["ghost_moment"], axis=1)
+        pressure = per_weight(pressure, sums["ghost_weight"], context.space)
+        density = context.fluid.density(pressure)
+        return {"pressure": pressure, "density": density, "volume": context.mass / density}
+
+
+def per_weight(total, weight, space):
+    """total / weight, and 0 for a ghost that no fluid particle reaches."""
+    reached = weight > 1e-6 * space.kernel_at_spacing
+    return jnp.where(reached, total / jnp.where(reached, weight, 1.0), 0.0)

@@ -1,0 +1,57 @@
+"""The velocity of ghosts as viscosity sees it: no-slip and free-slip walls."""
+
+import jax
+import jax.numpy as jnp
+
+from ..pairs import PairTerm
+from .base import Effect
+from .wall_pressure import GHOST_WEIGHT, per_weight
+
+
+def ghost_velocity(pair, i, j):
+    """u_j W_ij"""
+    return j.velocity * pair.kernel
+
+
+def _near_velocity(sums, space):
+    """<u>_i = sum_j u_j W_ij / sum_j W_ij"""
+    mean = jax.vmap(lambda total: per_weight(total, sums["ghost_weight"], space), 1, 1)
+    return mean(sums["ghost_velocity"])
+
+
+class NoSlip(Effect):
+    """u_i = 2 u_w - <u>_i at ghost i (Adami et al. 2012, eq. 23), u_w the wall's velocity:
+
+    the fluid's velocity, extrapolated through the wall's own at the surface. With u_w = 0 this is
+    the paper's no-slip line, the tangential part reversed.
+    """
+
+    def ghost_terms(self, space):
+        return (GHOST_WEIGHT, PairTerm("ghost_velocity", ("velocity",), ghost_velocity))
+
+    def ghost_fields(self, context, ghosts, sums):
+        near = _near_velocity(sums, context.space)
+        return {"velocity": 2.0 * ghosts["wall_velocity"] - near}
+
+
+class FixedWallVelocity(Effect):
+    """u_i = u_w at ghost i: the other reading of the paper's lid of "fixed ghost particles".
+
+    The fluid then meets the wall's velocity about half a spacing behind the surface, to first
+    order only; `NoSlip` is more accurate.
+    """
+
+    def ghost_fields(self, context, ghosts, sums):
+        return {"velocity": ghosts["wall_velocity"]}
+
+
+class FreeSlip(Effect):
+    """u_i = <u>_i - 2 (<u>_i . n) n at ghost i: the mirror image of the fluid's velocity."""
+
+    def ghost_terms(self, space):
+        return (GHOST_WEIGHT, PairTerm("ghost_velocity", ("velocity",), ghost_velocity))
+
+    def ghost_fields(self, context, ghosts, sums):
+        near, normal = _near_velocity(sums, context.space), ghosts["normal"]
+        along = jnp.sum(near * normal, axis=1, keepdims=True)
+        return {"velocity": near - 2.0 * along * normal}

@@ -1,0 +1,248 @@
+"""Neighbour lists of a fluid with walls: among its particles, and between these and the ghosts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Bool, Float, Int
+from scipy.spatial import cKDTree
+
+from ..chunks import chunked_map
+from ..domain import Box
+from .cell_grid import CellGrid
+from .verlet_list import (
+    CAPACITY_MARGIN,
+    NeighborSearch,
+    VerletList,
+    candidates,
+    count_bits,
+    pack,
+    pick,
+)
+
+_BLOCK = 4_000_000  # candidates looked at in one go
+
+
+class WallPairs(eqx.Module):
+    """Pairs of a fluid particle and a ghost.
+
+    Rows 0 to W - 1 of `index` belong to the W particles listed in `near`, all others to the ghosts
+    listed in `ghosts`; entries are row numbers. Each pair stands in both rows.
+
+    Args:
+        index: neighbours of each row; a free slot holds the row's own number.
+        near: places, in the fluid list's sorted order, of the particles that may see a wall.
+        ghosts: numbers of the ghosts.
+    """
+
+    index: Int[Array, "rows capacity"]
+    near: Int[Array, " near"]
+    ghosts: Int[Array, " ghosts"]
+
+    @property
+    def fluid_rows(self) -> tuple[int, int]:
+        return 0, self.near.shape[0]
+
+    @property
+    def ghost_rows(self) -> tuple[int, int]:
+        return self.near.shape[0], self.index.shape[0]
+
+
+class WallList(eqx.Module):
+    """The Verlet list of the fluid, and the pairs that it makes with ghosts."""
+
+    fluid: VerletList
+    wall: WallPairs
+    crowded: Bool[Array, ""]
+
+    def sort(self, field: Array) -> Array:
+        """A per-particle field in the fluid list's cell-sorted order."""
+        return self.fluid.sort(field)
+
+    def unsort(self, field: Array) -> Array:
+        """A field in cell-sorted order back in the particles' own order."""
+        return self.fluid.unsort(field)
+
+    def largest_motion(self, box: Box, position: Array) -> tuple[Array, Array]:
+        """The longest way [m] that a particle has gone since the list was built, and which one."""
+        return self.fluid.largest_motion(box, position)
+
+    @property
+    def reference(self) -> Float[Array, "particles dim"]:
+        return self.fluid.reference
+
+    @property
+    def overflow(self) -> Array:
+        """Whether a row, a cell or the number of particles near walls exceeds its room."""
+        return self.fluid.overflow | self.crowded
+
+
+class WalledSearch(eqx.Module):
+    """Search for the neighbours of fluid particles among themselves and among ghosts.
+
+    Only particles that may come within reach of a ghost have rows in the list of wall pairs; the
+    cells of `reach_grid` marked in `within_reach` tell which.
+
+    Args:
+        fluid: search among the fluid's particles.
+        ghosts: positions of the ghosts (G, n) [m].
+        within_reach: marks of cells from which a ghost can be seen.
+        reach_grid: cells about half a spacing wide.
+        wall_grid: cells over the fluid's box and its ghosts.
+        near_capacity: particles that can be near a wall.
+        capacity: partners a particle or a ghost can have across the wall.
+        near_cell_capacity, ghost_cell_capacity: of each kind in a cell.
+    """
+
+    fluid: NeighborSearch
+    ghosts: Float[Array, "ghosts dim"]
+    within_reach: Bool[Array, " cells"]
+    reach_grid: CellGrid = eqx.field(static=True)
+    wall_grid: CellGrid = eqx.field(static=True)
+    near_capacity: int = eqx.field(static=True)
+    capacity: int = eqx.field(static=True)
+    near_cell_capacity: int = eqx.field(static=True)
+    ghost_cell_capacity: int = eqx.field(static=True)
+
+    @classmethod
+    def allocate(
+        cls,
+        position: Float[Array, "particles dim"],
+        ghosts: Float[Array, "ghosts dim"],
+        box: Box,
+        support: float,
+        skin: float,
+        spacing: float,
+        margin: float = CAPACITY_MARGIN,
+    ) -> WalledSearch:
+        """Choose capacities for particles near `position`, `margin` times what these need.
+
+        Raises:
+            ValueError: as `NeighborSearch.allocate`.
+        """
+        fluid = NeighborSearch.allocate(position, box, support, skin, margin)
+        radius = support + skin
+        reach_grid = CellGrid.with_width(box, 0.5 * spacing, reach=0)
+        distance = _distance_to_nearest(reach_grid.centers, np.asarray(ghosts), box)
+        half_diagonal = 0.5 * math.hypot(*reach_grid.widths)
+        within_reach = jnp.asarray(distance < radius + half_diagonal)
+        wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
+        near = within_reach[reach_grid.locate(position)]
+        most = min(position.shape[0], int(np.ceil(margin * int(near.sum()))) + 1)
+        trial = cls(
+            fluid,
+            ghosts,
+            within_reach,
+            reach_grid,
+            wall_grid,
+            most,
+            1,
+            int(1.3 * wall_grid.occupancy(position)) + 2,
+            wall_grid.occupancy(ghosts),
+        )
+        largest = int(jax.jit(lambda x: trial._flag(x)[-1][1])(position))
+        return replace(trial, capacity=max(8, int(np.ceil(margin * largest))))
+
+    @property
+    def skin(self) -> float:
+        return self.fluid.skin
+
+    @property
+    def box(self) -> Box:
+        return self.fluid.box
+
+    def enlarged(self) -> WalledSearch:
+        """The same search with a fifth more room."""
+        return replace(
+            self,
+            fluid=self.fluid.enlarged(),
+            near_capacity=math.ceil(1.2 * self.near_capacity),
+            capacity=math.ceil(1.2 * self.capacity),
+            near_cell_capacity=math.ceil(1.2 * self.near_cell_capacity),
+        )
+
+    def build(self, position: Float[Array, "particles dim"]) -> WallList:
+        """All pairs within support + skin, of two particles or of a particle and a ghost."""
+        position = lax.stop_gradient(position)
+        fluid = self.fluid.build(position)
+        near, ghosts, (seen, seeing), (overflow, _) = self._flag(fluid.sort(position))
+        count = near.shape[0]
+        index = jnp.concatenate(
+            [
+                pick(*seen, self.capacity, entry=count),
+                pick(*seeing, self.capacity, own=count),
+            ]
+        )
+        return WallList(fluid, WallPairs(index, near, ghosts), overflow)
+
+    def _flag(self, position):
+        """Near particles and ghosts, each in cell order; and the flags of each among the other."""
+        grid = self.wall_grid
+        within = self.within_reach[self.reach_grid.locate(position)]
+        # particles that are not near fill the rows left over: real ones, which see no ghost
+        near = jnp.argsort(~within, stable=True)[: self.near_capacity].astype(jnp.int32)
+        particles = grid.bin(position[near], self.near_cell_capacity)
+        ghosts = grid.bin(self.ghosts, self.ghost_cell_capacity)
+        near = near[particles.order]
+        here, there = position[near], self.ghosts[ghosts.order]
+        sides, largest = [], jnp.zeros((), jnp.int32)
+        for points, cell, others, bins in (
+            (here, particles.cell, there, ghosts),
+            (there, ghosts.cell, here, particles),
+        ):
+            around = candidates(bins, grid, others.shape[0])
+            words = self._within(points, cell, others, around)
+            largest = jnp.maximum(largest, jnp.max(count_bits(words)))
+            sides.append((words, cell, around))
+        overflow = (
+            (jnp.sum(within) > near.shape[0]) | particles.overflow | (largest > self.capacity)
+        )
+        return near, ghosts.order, sides, (overflow, largest)
+
+    def _within(self, points, cell, others, around):
+        """Bits of the candidates `around` each point's cell that are within support + skin."""
+        padded = jnp.concatenate([others, jnp.full((1, self.box.dim), jnp.nan, others.dtype)])
+        radius_squared = (self.fluid.support + self.skin) ** 2
+
+        def rows(block):
+            points, cell = block
+            there = padded[around[cell]]
+            squared = jnp.zeros((), points.dtype)
+            for k in range(self.box.dim):
+                separation = there[:, :, k] - points[:, k : k + 1]
+                squared = squared + self.box.minimum_image(separation, k) ** 2
+            return pack(squared < radius_squared)
+
+        return chunked_map(rows, (points, cell), max(1, _BLOCK // around.shape[1]))
+
+
+def _around(box: Box, margin: float) -> Box:
+    """The box, wider by a margin [m] at its closed faces."""
+    return Box(
+        tuple(a if p else a - margin for a, p in zip(box.lower, box.periodic, strict=True)),
+        tuple(b if p else b + margin for b, p in zip(box.upper, box.periodic, strict=True)),
+        box.periodic,
+    )
+
+
+def _distance_to_nearest(points: np.ndarray, others: np.ndarray, box: Box) -> np.ndarray:
+    """Distance [m] of each point to the nearest of the others, across periodic faces too."""
+    # the tree wraps coordinates into [0, length); a length of 0 says that a direction is closed
+    period = [length if p else 0.0 for length, p in zip(box.lengths, box.periodic, strict=True)]
+    lower = np.where(box.periodic, box.lower, 0.0)
+    wrap = np.asarray([length if length else np.inf for length in period])
+    tree = cKDTree(_wrapped(others - lower, wrap), boxsize=period)
+    return tree.query(_wrapped(points - lower, wrap))[0]
+
+
+def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    closed = np.isinf(lengths)
+    safe = np.where(closed, 1.0, lengths)
+    wrapped = np.where(closed, points, np.mod(points, safe))
+    return np.where(~closed & (wrapped >= safe), 0.0, wrapped)  # mod may round up to the length

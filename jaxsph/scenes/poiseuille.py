@@ -1,0 +1,71 @@
+"""Poiseuille flow: between plates at rest, driven by a body force."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from ..arrangements import Arrangement
+from ..effects import Effect, Gravity
+from ..kernels import Kernel
+from .couette import CHANNEL, SCALES, channel_box
+from .enclosed import enclosed_flow, pick_scale, positive
+from .scene import Scene
+
+
+def poiseuille(
+    resolution: int | None = None,
+    reynolds: float = 10.0,
+    *,
+    scale: str = "small",
+    h_over_dx: float | None = None,
+    time_step: float | None = None,
+    end_time: float = 2.0,
+    layers: int | None = None,
+    wall_velocity: Effect | None = None,
+    arrangement: Arrangement | None = None,
+    kernel: Kernel | None = None,
+    mach: float = 0.1,
+    dtype=None,
+) -> Scene:
+    """Poiseuille flow from rest: a channel 1 m high under a force that drives it to U = 1 m/s.
+
+    b = 8 nu U / H^2 along the channel, so that the steady profile peaks at U; Re = U H / nu;
+    rho0 = 1 kg/m^3. `plane_flow_solution.poiseuille` is its exact solution.
+
+    Args:
+        resolution: particles across; overrides the scale's, time step scaled along.
+        reynolds: Reynolds number.
+        scale: `small` (50 across), `half` (100) or `paper` (200).
+        h_over_dx: smoothing length over spacing; overrides the scale's.
+        time_step: dt [s]; overrides the scale's.
+        end_time: [s].
+        layers: of ghosts; a full support's if none is given.
+        wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given.
+        arrangement: how particles start; the lattice if none is given.
+        kernel: Wendland C2 if none is given.
+        mach: Mach number U / c0.
+        dtype: float64 or float32; JAX's default if none is given.
+
+    Raises:
+        ValueError: for a Reynolds number, resolution or step out of range.
+    """
+    positive(reynolds=reynolds, **{"t-end": end_time})
+    chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
+    return enclosed_flow(
+        "poiseuille",
+        box=channel_box(chosen),
+        fluid_region=CHANNEL,
+        force=lambda dtype: Gravity(jnp.asarray([8.0 / reynolds, 0.0], dtype)),
+        scale=chosen,
+        end_time=end_time,
+        reference_density=1.0,
+        reference_speed=1.0,
+        mach=mach,
+        viscosity=1.0 / reynolds,
+        wall_velocity=wall_velocity,
+        layers=layers,
+        arrangement=arrangement,
+        kernel=kernel,
+        dtype=dtype,
+        parameters={"scale": scale, "reynolds": reynolds},
+    )

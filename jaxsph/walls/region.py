@@ -1,0 +1,102 @@
+"""Parts of space, by their signed distance."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from typing import final
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+@dataclass(frozen=True)
+class Region(abc.ABC):
+    """A part of space. `a | b` is what is in either, `a & b` what is in both, `~a` the rest of space.
+
+    A region is structure, not data: it is hashable by value.
+    """
+
+    @abc.abstractmethod
+    def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
+        """Distance [m] to the region's surface, negative inside. Inside unions and outside
+        intersections it may be less than the true distance in size; its sign is always right."""
+
+    def __or__(self, other: Region) -> Region:
+        return Union((self, other))
+
+    def __and__(self, other: Region) -> Region:
+        return ~(~self | ~other)
+
+    def __invert__(self) -> Region:
+        return Complement(self)
+
+
+@final
+@dataclass(frozen=True)
+class BoxRegion(Region):
+    """A box with corners `lower` and `upper` [m]; infinite in a direction whose corners are."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def __post_init__(self):
+        if len(self.lower) != len(self.upper) or not all(
+            a < b for a, b in zip(self.lower, self.upper, strict=True)
+        ):
+            raise ValueError(f"BoxRegion: every upper must exceed its lower, got {self}.")
+
+    def signed_distance(self, position):
+        beyond = []
+        for k, (low, high) in enumerate(zip(self.lower, self.upper, strict=True)):
+            x = position[:, k]
+            if np.isfinite(low):
+                beyond.append(low - x)
+            if np.isfinite(high):
+                beyond.append(x - high)
+        if not beyond:
+            return jnp.full(position.shape[0], -jnp.inf, position.dtype)
+        inside = reduce(jnp.maximum, beyond)
+        # of the two faces of a direction at most one is behind a point outside
+        squared = sum(jnp.maximum(b, 0.0) ** 2 for b in beyond)
+        outside = squared > 0.0
+        return jnp.where(outside, jnp.sqrt(jnp.where(outside, squared, 1.0)), inside)
+
+
+@final
+@dataclass(frozen=True)
+class SignedDistance(Region):
+    """A region given by a function: positions (P, n) [m] -> signed distances (P,) [m].
+
+    The function is written with `jax.numpy`; its gradient gives the walls' normals.
+    """
+
+    function: Callable[[Array], Array]
+
+    def signed_distance(self, position):
+        return self.function(position)
+
+
+@final
+@dataclass(frozen=True)
+class Union(Region):
+    """What is in any of the parts."""
+
+    parts: tuple[Region, ...]
+
+    def signed_distance(self, position):
+        return reduce(jnp.minimum, [part.signed_distance(position) for part in self.parts])
+
+
+@final
+@dataclass(frozen=True)
+class Complement(Region):
+    """What is not in a region."""
+
+    region: Region
+
+    def signed_distance(self, position):
+        return -self.region.signed_distance(position)

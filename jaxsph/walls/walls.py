@@ -1,0 +1,186 @@
+"""Walls as layers of fixed ghost particles (Adami, Hu and Adams 2012)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ..arrangements import Lattice
+from ..domain import Box
+from ..pairs import Space
+from .region import Region
+
+_PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
+_TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
+
+
+@final
+@dataclass(frozen=True)
+class MovingWall:
+    """A part of a wall that slides along itself, a lid say.
+
+    Args:
+        part: region that holds the ghosts of this part.
+        velocity: ghost positions (G, n) [m] -> wall velocities (G, n) [m/s].
+    """
+
+    part: Region
+    velocity: Callable[[Array], Array]
+
+
+class Walls(eqx.Module):
+    """Ghost particles around a region of fluid.
+
+    Args:
+        position: of the ghosts (G, n) [m].
+        normal: unit normals (G, n) of the nearest wall, towards the fluid.
+        velocity: of the wall at each ghost (G, n) [m/s]; along the wall.
+        fluid_region: where fluid may be (static).
+    """
+
+    position: Float[Array, "ghosts dim"]
+    normal: Float[Array, "ghosts dim"]
+    velocity: Float[Array, "ghosts dim"]
+    fluid_region: Region = eqx.field(static=True)
+
+    @classmethod
+    def around(
+        cls,
+        fluid_region: Region,
+        space: Space,
+        moving: Sequence[MovingWall] = (),
+        layers: int | None = None,
+    ) -> Walls:
+        """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
+
+        Args:
+            fluid_region: where fluid may be; everything else in and around the box is wall.
+            space: its box encloses the fluid; closed directions end at walls.
+            moving: parts of the walls that move along themselves; all others are at rest.
+            layers: of ghosts; as many as fill the kernel's support if none is given. The paper's
+                three leave a particle beside the wall a support that is not full.
+
+        Raises:
+            ValueError: for a gap in the walls, a wall too thin, or a moving part without a wall.
+        """
+        full = math.ceil(space.support / space.spacing - 1e-9)
+        layers = full if layers is None else layers
+        if layers < 1:
+            raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
+        distance = jax.jit(fluid_region.signed_distance)
+        _refuse_gaps(distance, space)
+        lattice = _extended_lattice(space, layers)
+        depth = np.asarray(distance(lattice))
+        ghosts = lattice[(depth >= 0.0) & (depth < layers * space.spacing)]
+        if not len(ghosts):
+            raise ValueError(
+                "walls: the region of fluid leaves no place for a wall; let the box be closed in "
+                "some direction, or the region smaller than the box."
+            )
+        normal = -np.asarray(_gradient(fluid_region, ghosts))
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        if not np.all(length > 0.5):
+            where = ghosts[int(np.argmin(length))]
+            raise ValueError(
+                f"walls: the signed distance has no slope at {_at(where)}; its gradient must point "
+                "away from the fluid everywhere in the wall."
+            )
+        normal = normal / length
+        depth = np.asarray(distance(ghosts))[:, None]
+        _refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
+        velocity = np.zeros_like(ghosts)
+        for lid in moving:
+            held = np.asarray(lid.part.signed_distance(jnp.asarray(ghosts))) < 0.0
+            if not held.any():
+                raise ValueError(
+                    f"moving wall: no ghost lies in {lid.part}; a lid needs a wall to sit in. Let "
+                    "its part cover ghosts beyond the fluid."
+                )
+            velocity[held] = np.asarray(lid.velocity(jnp.asarray(ghosts[held])))
+        return cls(jnp.asarray(ghosts), jnp.asarray(normal), jnp.asarray(velocity), fluid_region)
+
+    def beyond(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
+        """Which particles are inside a wall."""
+        return self.fluid_region.signed_distance(position) > 0.0
+
+
+def fill(region: Region, position: Float[Array, "points dim"]) -> Float[Array, "particles dim"]:
+    """Those of the positions that lie in a region of fluid.
+
+    Raises:
+        ValueError: if none does.
+    """
+    inside = np.asarray(region.signed_distance(position)) < 0.0
+    if not inside.any():
+        raise ValueError(
+            "fluid: no particle lies in the region; raise the resolution or check the region."
+        )
+    return position[inside]
+
+
+def _gradient(region: Region, points):
+    slope = jax.grad(lambda x: region.signed_distance(x[None, :])[0])
+    return jax.vmap(slope)(jnp.asarray(points))
+
+
+def _at(point) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
+
+
+def _extended_lattice(space: Space, layers: int) -> np.ndarray:
+    """The lattice of the box, continued by some layers beyond its closed faces."""
+    dx, box = space.spacing, space.box
+    counts = [round(length / dx) for length in box.lengths]
+    steps = [length / count for length, count in zip(box.lengths, counts, strict=True)]
+    more = [0 if periodic else layers for periodic in box.periodic]
+    wider = Box(
+        tuple(a - m * s for a, m, s in zip(box.lower, more, steps, strict=True)),
+        tuple(b + m * s for b, m, s in zip(box.upper, more, steps, strict=True)),
+        box.periodic,
+    )
+    return np.asarray(Lattice().positions(Space(wider, space.kernel, space.smoothing_length, dx)))
+
+
+def _refuse_gaps(distance, space: Space) -> None:
+    """The fluid must not reach past a closed face of the box."""
+    box, dx = space.box, space.spacing
+    for axis, side in product(range(box.dim), (0, 1)):
+        if box.periodic[axis]:
+            continue
+        ticks = []
+        for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
+            count = 1 if k == axis else max(2, round(length / (_PITCH * dx)) + 1)
+            ticks.append(low + np.linspace(0.0, length, count))
+        ticks[axis] = np.asarray([(box.lower, box.upper)[side][axis]])
+        face = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
+        depth = np.asarray(distance(jnp.asarray(face)))
+        if depth.min() < -_TOUCH * dx:
+            raise ValueError(
+                f"walls: a gap at {_at(face[int(np.argmin(depth))])}: the fluid reaches past a "
+                "closed face of its box there. Close it with a wall, widen the box, or make that "
+                "direction periodic."
+            )
+
+
+def _refuse_thin_walls(distance, space: Space, surface, normal) -> None:
+    """Fluid on one side of a wall must not be felt on the other, nor by the other's ghosts."""
+    needed = 2.0 * space.support
+    for depth in np.arange(0.25, needed / space.spacing, 0.5) * space.spacing:
+        behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
+        wet = np.asarray(distance(jnp.asarray(behind))) < 0.0
+        if wet.any():
+            raise ValueError(
+                f"walls: the wall at {_at(surface[int(np.argmax(wet))])} is about {depth:.3g} m "
+                f"thick, thinner than twice the kernel's support of {space.support:.3g} m; the "
+                "fluids on its two sides would feel each other. Make it thicker or raise the "
+                "resolution."
+            )
