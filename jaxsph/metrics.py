@@ -22,11 +22,15 @@ def relative_discrepancy(
 ) -> Float[np.ndarray, " times"]:
     """Percent relative discrepancy at each time (paper, eq. PRD):
 
-    100 mean_i |c_i - c~_i| / (max_i c_i - min_i c_i).
+    100 mean_i |c_i - c~_i| / (max_i c_i - min_i c_i),
+
+    0 where both are the same constant, as at the start from rest.
     """
     reference, values = np.asarray(reference), np.asarray(values)
     spread = reference.max(axis=1) - reference.min(axis=1)
-    return 100.0 * np.abs(reference - values).mean(axis=1) / spread
+    apart = np.abs(reference - values).mean(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(apart == 0.0, 0.0, 100.0 * apart / spread)
 
 
 def probe_line(space: Space, axis: int, through: tuple[float, ...], count: int) -> np.ndarray:
@@ -37,12 +41,21 @@ def probe_line(space: Space, axis: int, through: tuple[float, ...], count: int) 
     return line
 
 
+def vertical_slice(space: Space, x: float) -> np.ndarray:
+    """Probes on a vertical line at x [m] (along the second axis), one per spacing."""
+    box = space.box
+    if not box.lower[0] <= x <= box.upper[0]:
+        raise ValueError(
+            f"slice: x = {x:g} m is outside the box, which is from {box.lower[0]:g} to "
+            f"{box.upper[0]:g} m."
+        )
+    middle = tuple(a + 0.5 * b for a, b in zip(box.lower, box.lengths, strict=True))
+    return probe_line(space, 1, (x, *middle[1:]), round(box.lengths[1] / space.spacing))
+
+
 def centre_line(space: Space) -> np.ndarray:
     """Probes on the vertical centre line (along the second axis), one per spacing."""
-    centre = tuple(
-        low + 0.5 * length for low, length in zip(space.box.lower, space.box.lengths, strict=True)
-    )
-    return probe_line(space, 1, centre, round(space.box.lengths[1] / space.spacing))
+    return vertical_slice(space, space.box.lower[0] + 0.5 * space.box.lengths[0])
 
 
 def probe(

@@ -6,8 +6,12 @@ import abc
 from dataclasses import dataclass
 
 from jaxsph import PairTerm
-from jaxsph.effects import Effect, ShiftingTransport
-from jaxsph.effects.continuity import VELOCITY_DIVERGENCE
+from jaxsph.effects import Effect, ShiftingTransport, WallTerm
+from jaxsph.effects.continuity import (
+    VELOCITY_DIVERGENCE,
+    WALL_DIVERGENCE,
+    reflected_divergence,
+)
 
 
 def mass_flux(pair, i, j):
@@ -21,6 +25,20 @@ def momentum_flux(pair, i, j):
     return j.velocity * there + i.velocity * here
 
 
+def wall_mass_flux(pair, i, j):
+    """(rho_j u_j + rho_i u_i) . grad_i W_ij V_j with u_j = u_i - 2 (u_i . n_j) n_j"""
+    here = i.velocity.dot(pair.gradient)
+    there = here + reflected_divergence(pair, i, j)
+    return j.density * there + i.density * here
+
+
+def wall_momentum_flux(pair, i, j):
+    """(u_g (x) u_j + u_i (x) u_i) . grad_i W_ij V_j with u_j as above, u_g the ghost's velocity"""
+    here = i.velocity.dot(pair.gradient)
+    there = here + reflected_divergence(pair, i, j)
+    return j.velocity * there + i.velocity * here
+
+
 class FieldAdvection(Effect):
     """Minus the advection of fields by the flow (paper, eqs. continuity and momentum advection):
 
@@ -28,6 +46,9 @@ class FieldAdvection(Effect):
                        - rho_i sum_j (u_j - u_i).grad W V_j,
     grad u_i . u_i   = sum_j (u_j (x) u_j + u_i (x) u_i).grad W V_j
                        - u_i sum_j (u_j - u_i).grad W V_j.
+
+    At a wall the velocity that carries is the particle's own with its normal part reversed, as in
+    the continuity equation; the velocity that is carried is the ghost's.
     """
 
     def rate_terms(self, space):
@@ -35,6 +56,14 @@ class FieldAdvection(Effect):
             VELOCITY_DIVERGENCE,
             PairTerm("mass_flux", ("velocity", "density"), mass_flux),
             PairTerm("momentum_flux", ("velocity",), momentum_flux),
+        )
+
+    def wall_rate_terms(self, space):
+        velocity = ("velocity",)
+        return (
+            WALL_DIVERGENCE,
+            WallTerm("mass_flux", ("velocity", "density"), ("normal", "density"), wall_mass_flux),
+            WallTerm("momentum_flux", velocity, ("normal", "velocity"), wall_momentum_flux),
         )
 
     def rates(self, context, fields, sums):

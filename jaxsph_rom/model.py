@@ -25,6 +25,8 @@ from .field_advection import Advection, PaperAdvection
 from .projection import Projection, PseudoInverse
 from .splines import LocalSplines
 
+_REACH = 0.5  # times dx: the part of a wall's neighbourhood where particles are slowed
+
 
 class ReducedState(eqx.Module):
     """Reduced coordinates (M,) and particle positions (N, n) [m]; also their rates."""
@@ -38,8 +40,9 @@ class ReducedModel(Model):
 
         d(w^)/dt = projection of f-bar(Phi~(x) w^),    dx/dt = u~ + du~.
 
-    It runs in the full model's loop. At every stage the modes are carried to the particles by
-    local splines, so its cost is that of a full right-hand side and more.
+    Near walls the particles' velocity towards the wall fades out, as modes do not keep particles
+    inside. It runs in the full model's loop. At every stage the modes are carried to the particles
+    by local splines, so its cost is that of a full right-hand side and more.
 
     Args:
         functional: f-bar, the Eulerian SPH functional.
@@ -132,7 +135,14 @@ class ReducedModel(Model):
         coordinates = self.projection.reduce(
             self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates
         )
-        return ReducedState(coordinates, transport)
+        return ReducedState(coordinates, self._transport(state.position, transport))
+
+    def _transport(self, position, velocity):
+        """The velocity of the particles; modes carry some of it through walls."""
+        walls = self.functional.walls
+        if walls is None:
+            return velocity
+        return walls.keep_inside(position, velocity, _REACH * self.functional.space.spacing)
 
     def finish(self, state):
         box = self.functional.space.box

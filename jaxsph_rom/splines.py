@@ -58,7 +58,7 @@ class LocalSplines(eqx.Module):
             values: of the functions at the points.
             space: cells are at least as wide as its kernel's support, 2h for Wendland's.
             order: k of the polyharmonic function; 1, 2, 3, ...
-            margin: room for particles per cell, over the mean number.
+            margin: room for particles per cell, over the number in a full one.
 
         Raises:
             ValueError: for an order below 1, or a cell neighbourhood with too few points.
@@ -71,7 +71,9 @@ class LocalSplines(eqx.Module):
         cell = np.asarray(grid.locate(jnp.asarray(points)))
         by_cell = [np.flatnonzero(cell == c) for c in range(grid.cells)] + [np.empty(0, int)]
         members = [np.concatenate([by_cell[c] for c in row]) for row in grid.stencil]
-        largest, fewest = max(map(len, members)), min(map(len, members))
+        largest = max(map(len, members))
+        # a cell without points is inside a wall and never asked
+        fewest = min(len(m) for m, own in zip(members, by_cell, strict=False) if len(own))
         if fewest < box.dim + 1:
             raise ValueError(
                 f"points: a cell neighbourhood holds {fewest} reference points, too few for a "
@@ -82,6 +84,8 @@ class LocalSplines(eqx.Module):
         node_weights = np.zeros((grid.cells, largest, values.shape[1]), values.dtype)
         linear_weights = np.zeros((grid.cells, dim + 1, values.shape[1]), values.dtype)
         for c, index in enumerate(members):
+            if len(index) <= dim:
+                continue
             offset = points[index] - grid.centers[c]
             for k in range(dim):
                 if box.periodic[k]:
@@ -100,8 +104,8 @@ class LocalSplines(eqx.Module):
             nodes[c, : len(index)] = local
             node_weights[c, : len(index)] = solution[: len(index)]
             linear_weights[c] = solution[len(index) :]
-        mean = len(points) / grid.cells
-        capacity = int(margin * mean) + 6
+        full = np.prod(width) / space.spacing**dim
+        capacity = int(margin * full) + 6
         return cls(
             jnp.asarray(nodes),
             jnp.asarray(node_weights),

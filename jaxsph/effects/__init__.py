@@ -13,6 +13,7 @@ from .particle_shifting import ParticleShifting as ParticleShifting
 from .pressure_force import PressureForce as PressureForce
 from .shifting_transport import ShiftingTransport as ShiftingTransport
 from .wall_pressure import WallPressure as WallPressure
+from .wall_repulsion import WallRepulsion as WallRepulsion
 from .wall_velocity import FixedWallVelocity as FixedWallVelocity
 from .wall_velocity import FreeSlip as FreeSlip
 from .wall_velocity import NoSlip as NoSlip

@@ -37,7 +37,7 @@ class Gravity(BodyForce):
 
 
 class KickAndHold(BodyForce):
-    """The open cavity's drive along the first axis, where `start` <= x <= `end` (paper):
+    """The open cavity's drive along the first axis, inside a box from `lower` to `upper` (paper):
 
         b_x(t) = b0 [1 / (1 + exp(-k (f0 - t))) + k0].
 
@@ -49,20 +49,21 @@ class KickAndHold(BodyForce):
         steepness: k [1/s].
         duration: f0 [s].
         remainder: k0, the share of b0 that stays.
-        start, end: the part of the first axis [m] where it acts.
+        lower, upper: corners of the box [m] where it acts (static).
     """
 
     amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     steepness: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     duration: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     remainder: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    start: float = eqx.field(static=True)
-    end: float = eqx.field(static=True)
+    lower: tuple[float, ...] = eqx.field(static=True)
+    upper: tuple[float, ...] = eqx.field(static=True)
 
     def acceleration(self, time, position):
         ramp = jax.nn.sigmoid(self.steepness * (self.duration - time))
         strength = self.amplitude * (ramp + self.remainder)
-        x = position[:, 0]
-        inside = (x >= self.start) & (x <= self.end)
+        lower = jnp.asarray(self.lower, position.dtype)[None, :]
+        upper = jnp.asarray(self.upper, position.dtype)[None, :]
+        inside = jnp.all((position >= lower) & (position <= upper), axis=1)
         force = jnp.zeros_like(position)
         return force.at[:, 0].set(jnp.where(inside, strength, jnp.zeros((), position.dtype)))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..trajectory import Trajectory
-from .trajectory_file import FIELDS, TrajectoryFileError, patient, opened
+from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient
 
 
 def snapshot_blocks(path: str | os.PathLike, size: int) -> Iterator[Trajectory]:

@@ -21,6 +21,7 @@ from ..effects import (
     PressureForce,
     ShiftingTransport,
     WallPressure,
+    WallRepulsion,
 )
 from ..fluid import Fluid
 from ..kernels import Kernel, WendlandC2
@@ -109,6 +110,7 @@ def enclosed_flow(
             *(() if drive is None else (drive,)),
             WallPressure(drive),
             NoSlip() if wall_velocity is None else wall_velocity,
+            WallRepulsion(fluid_region),
         ),
         fluid=fluid,
         space=space,

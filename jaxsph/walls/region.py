@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 @dataclass(frozen=True)
 class Region(abc.ABC):
-    """A part of space. `a | b` is what is in either, `a & b` what is in both, `~a` the rest of space.
+    """A part of space. `a | b` is what is in either, `a & b` what is in both, `~a` the rest.
 
     A region is structure, not data: it is hashable by value.
     """

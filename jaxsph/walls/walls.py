@@ -112,6 +112,24 @@ class Walls(eqx.Module):
         """Which particles are inside a wall."""
         return self.fluid_region.signed_distance(position) > 0.0
 
+    def keep_inside(
+        self,
+        position: Float[Array, "particles dim"],
+        velocity: Float[Array, "particles dim"],
+        reach: float,
+    ) -> Float[Array, "particles dim"]:
+        """Velocities whose part towards a wall fades out within `reach` [m] of it:
+
+        u - (1 - s) min(u . n, 0) n,    s = clip(d / reach, 0, 1),
+
+        d the distance to the wall, n its normal. No particle that moves so passes the wall.
+        """
+        outward = _gradient(self.fluid_region, position)
+        distance = -self.fluid_region.signed_distance(position)
+        approach = jnp.maximum(jnp.sum(velocity * outward, axis=1), 0.0)
+        fade = 1.0 - jnp.clip(distance / reach, 0.0, 1.0)
+        return velocity - (fade * approach)[:, None] * outward
+
 
 def fill(region: Region, position: Float[Array, "points dim"]) -> Float[Array, "particles dim"]:
     """Those of the positions that lie in a region of fluid.

@@ -45,9 +45,9 @@ class Outcome:
 
     Args:
         case: errors and times.
-        time, velocity_percent, pressure_percent: discrepancy on the centre line over time (S,).
+        time, velocity_percent, pressure_percent: discrepancy on the probes over time (S,).
         trajectory: of the reduced model, as far as it came.
-        profile: velocity norm and pressure on the centre line over time, each (S, P).
+        profile: velocity norm and pressure on the probes over time, each (S, P).
     """
 
     case: Case
@@ -69,6 +69,8 @@ class Study:
         advection: how the Eulerian functional is made; the paper's if none.
         spline_order: of the polyharmonic splines.
         progress: opens a progress bar for each run.
+        probes: where runs are compared, (P, n) [m] from a scene; the centre line if none is given.
+        judged_from: time [s] from which on peaks and medians are taken.
     """
 
     def __init__(
@@ -80,6 +82,8 @@ class Study:
         advection: Advection | None = None,
         spline_order: int = 3,
         progress: Progress | None = None,
+        probes: Callable[[Scene], np.ndarray] | None = None,
+        judged_from: float = 0.0,
     ):
         self.scene = cache(make)
         self.folder = Path(folder)
@@ -88,8 +92,10 @@ class Study:
         self.advection = PaperAdvection() if advection is None else advection
         self.spline_order = spline_order
         self.progress = silent if progress is None else progress
+        self._probes = _centre_line if probes is None else probes
+        self.judged_from = judged_from
         self.full = cache(self._full)
-        self.centre_line = cache(self._centre_line)
+        self.profile = cache(self._profile)
         self.snapshots = cache(self._snapshots)
 
     def check(self, experiment: Experiment) -> None:
@@ -109,9 +115,13 @@ class Study:
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)
 
-    def _centre_line(self, reynolds: float) -> tuple[np.ndarray, np.ndarray]:
-        space = self.scene(reynolds).space
-        return probe(self.full(reynolds), centre_line(space), space)
+    def probes(self, reynolds: float) -> np.ndarray:
+        """Where runs are compared (P, n) [m]."""
+        return self._probes(self.scene(reynolds))
+
+    def _profile(self, reynolds: float) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity norm and pressure of the full run on the probes over time."""
+        return probe(self.full(reynolds), self.probes(reynolds), self.scene(reynolds).space)
 
     def reference(self, experiment: Experiment) -> ReferenceSpace:
         """The reference space: the initial configuration of the first training run."""
@@ -198,9 +208,10 @@ class Study:
 
     def _compare(self, experiment, reynolds, basis, projection, tau, run, fault) -> Outcome:
         scene, full = self.scene(reynolds), self.full(reynolds)
-        profile = probe(run, centre_line(scene.space), scene.space)
-        truth = tuple(a[: len(run.time)] for a in self.centre_line(reynolds))
+        profile = probe(run, self.probes(reynolds), scene.space)
+        truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
         percent = [relative_discrepancy(a, b) for a, b in zip(truth, profile, strict=True)]
+        judged = run.time >= min(self.judged_from, run.time[-1])
         case = Case(
             scene=scene.name,
             reynolds=reynolds,
@@ -210,10 +221,10 @@ class Study:
             inner_product=type(self.product).__name__.lower(),
             hyper="none",
             trained_on=tuple(experiment.trained_on),
-            velocity_peak_percent=float(percent[0].max()),
-            velocity_median_percent=float(np.median(percent[0])),
-            pressure_peak_percent=float(percent[1].max()),
-            pressure_median_percent=float(np.median(percent[1])),
+            velocity_peak_percent=float(percent[0][judged].max()),
+            velocity_median_percent=float(np.median(percent[0][judged])),
+            pressure_peak_percent=float(percent[1][judged].max()),
+            pressure_median_percent=float(np.median(percent[1][judged])),
             stable=fault is None,
             fom_seconds=_whole_run(full, scene.steps),
             rom_seconds=_whole_run(run, scene.steps) if fault is None else None,
@@ -226,6 +237,10 @@ class Study:
             fault_time=None if fault is None else fault.step * scene.time_step,
         )
         return Outcome(case, run.time, percent[0], percent[1], run, profile)
+
+
+def _centre_line(scene: Scene) -> np.ndarray:
+    return centre_line(scene.space)
 
 
 def _whole_run(trajectory: Trajectory, steps: int) -> float:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from jaxsph.environment import environment
-from jaxsph.metrics import centre_line
 from jaxsph.scenes import taylor_green_solution as exact
 
 from ..basis import cumulative_energy
@@ -115,8 +114,8 @@ def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float
     for reynolds, group in _by_reynolds(outcomes).items():
         scene, full = study.scene(reynolds), study.full(reynolds)
         k = full.nearest(time)
-        line = centre_line(scene.space)
-        speed, pressure = study.centre_line(reynolds)
+        line = study.probes(reynolds)
+        speed, pressure = study.profile(reynolds)
         curves = {"full": (speed[k], pressure[k])}
         for outcome in group:
             if outcome.time[-1] < full.time[k]:

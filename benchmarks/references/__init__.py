@@ -1,0 +1,1 @@
+"""Reference solutions and published tables that runs are compared with, independent of jaxsph."""
