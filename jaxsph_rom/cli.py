@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,13 +23,14 @@ from jaxsph.cli import (
 )
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
+from jaxsph.metrics import centre_line, vertical_slice
 from jaxsph.scenes import SCENES
 
 from .basis import Energy, Euclidean
 from .field_advection import ConsistentAdvection, PaperAdvection
 from .projection import AdjointPetrovGalerkin, Galerkin
 from .report import format_table
-from .study import Experiment, Study, write_study
+from .study import PLANS, Experiment, LocalBases, Plan, Study, settled, write_study
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
@@ -59,16 +61,19 @@ def _parser() -> Parser:
     run.set_defaults(command=_run)
     add = run.add_argument
     add("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
-    add("--train", type=positive_float, nargs="+", default=[100.0, 150.0, 200.0, 250.0],
-        metavar="RE", help="Reynolds numbers to train on (default: 100 150 200 250)")  # fmt: skip
-    add("--predict", type=positive_float, nargs="+", default=[125.0, 175.0, 225.0],
-        metavar="RE", help="Reynolds numbers to run at (default: 125 175 225)")  # fmt: skip
-    add("--modes", type=positive_int, nargs="+", default=[3], metavar="M",
-        help="numbers of modes (default: 3)")  # fmt: skip
+    add("--train", type=positive_float, nargs="+", metavar="RE",
+        help=f"Reynolds numbers to train on ({_defaults('train')})")  # fmt: skip
+    add("--predict", type=positive_float, nargs="+", metavar="RE",
+        help=f"Reynolds numbers to run at ({_defaults('predict')})")  # fmt: skip
+    add("--modes", type=positive_int, nargs="+", metavar="M",
+        help=f"numbers of modes ({_defaults('modes')})")  # fmt: skip
+    add("--borders", type=positive_float, nargs="+", metavar="RE",
+        help="borders of local bases over Re; two around all of them make one global basis "
+        f"({_defaults('borders')}; else a global basis)")  # fmt: skip
     add("--projection", choices=PROJECTIONS, nargs="+", default=["galerkin"],
         help="Galerkin, adjoint Petrov-Galerkin, or both (default: galerkin)")  # fmt: skip
-    add("--tau", type=positive_float, default=1e-4, metavar="T",
-        help="memory length of apg [s] (default: %(default)g)")  # fmt: skip
+    add("--tau", type=positive_float, metavar="T",
+        help=f"memory length of apg [s] ({_defaults('tau')})")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="energy",
         help="of POD and projection (default: %(default)s; euclidean is the paper's)")  # fmt: skip
     add("--advection", choices=tuple(ADVECTIONS), default="paper",
@@ -80,9 +85,12 @@ def _parser() -> Parser:
     add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
     add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
     add("--t-end", type=positive_float, metavar="T", help="end time [s]")
-    add("--arrangement", choices=tuple(ARRANGEMENTS), default="packed",
-        help="how particles start (default: %(default)s)")  # fmt: skip
-    add("--seed", type=seed, default=0, metavar="N", help="of the arrangement (default: 0)")
+    add("--slice", type=float, dest="slice_at", metavar="X",
+        help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
+        "0.25)")  # fmt: skip
+    add("--arrangement", choices=tuple(ARRANGEMENTS), help="how particles start (default: the "
+        "scene's)")  # fmt: skip
+    add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
     add("--precision", choices=("float32", "float64"), default="float64",
         help="default: %(default)s")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
@@ -100,23 +108,66 @@ def _run(options) -> int:
     check_target(report)
     check_target(folder / "report.json")
     with jax.enable_x64(options.precision == "float64"):
-        study, experiment = _study(options, folder)
-        study.check(experiment)
+        plan = _plan(options)
+        experiments = _experiments(plan)
+        study = _study(options, plan, folder)
         outcomes = []
         try:
-            for outcome in study.run(experiment):
-                outcomes.append(outcome)
+            for experiment in experiments:
+                study.check(experiment)
+            for experiment in experiments:
+                outcomes += study.run(experiment)
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
-        write_study(study, experiment, outcomes, folder, report)
+        write_study(study, experiments, outcomes, folder, report)
     print(format_table([outcome.case for outcome in outcomes]))
     print(f"\nreport: {report}\nfigures: {folder}/*.png")
     return 0
 
 
-def _study(options, folder: Path) -> tuple[Study, Experiment]:
+def _defaults(name: str) -> str:
+    """The defaults of an option, scene by scene."""
+    found: dict[str, list[str]] = {}
+    for scene, plan in PLANS.items():
+        value = getattr(plan, name)
+        if value is not None:
+            text = " ".join(f"{v:g}" for v in (value if isinstance(value, tuple) else (value,)))
+            found.setdefault(text, []).append(scene)
+    return "default: " + "; ".join(f"{text} for {', '.join(s)}" for text, s in found.items())
+
+
+def _plan(options) -> Plan:
+    """The scene's plan with what is given on the command line."""
+    plan = PLANS.get(options.scene)
+    if plan is None:
+        missing = [f"--{n}" for n in ("train", "predict", "modes") if getattr(options, n) is None]
+        if missing:
+            raise ValueError(
+                f"scene {options.scene} has no plan of its own; give {', '.join(missing)}."
+            )
+        plan = Plan((), (), (), 1e-4)
+    given = {}
+    for name in ("train", "predict", "modes", "borders"):
+        if getattr(options, name) is not None:
+            given[name] = tuple(dict.fromkeys(getattr(options, name)))
+    for name in ("tau", "slice_at"):
+        if getattr(options, name) is not None:
+            given[name] = getattr(options, name)
+    if {"train", "predict"} & set(given) and "borders" not in given:
+        given["borders"] = None  # the plan's borders belong to its own Reynolds numbers
+    return dataclasses.replace(plan, **given)
+
+
+def _experiments(plan: Plan) -> tuple[Experiment, ...]:
+    """One experiment with a global basis, or one for each local basis."""
+    if plan.borders is None:
+        return (Experiment(plan.train, plan.predict, plan.modes),)
+    return LocalBases(plan.borders).experiments(plan.train, plan.predict, plan.modes)
+
+
+def _study(options, plan: Plan, folder: Path) -> Study:
     make = SCENES[options.scene]
     settings = {
         "scale": options.scale,
@@ -127,28 +178,39 @@ def _study(options, folder: Path) -> tuple[Study, Experiment]:
     }
     if options.t_end is not None:
         settings["end_time"] = options.t_end
-    for reynolds in (*options.train, *options.predict):  # meets bad input before the packing
-        make(reynolds=reynolds, arrangement=ARRANGEMENTS["lattice"](seed=0), **settings)
-    arrangement = ARRANGEMENTS[options.arrangement](seed=options.seed)
+    for reynolds in (*plan.train, *plan.predict):  # meets bad input before the packing
+        cheap = make(reynolds=reynolds, arrangement=ARRANGEMENTS["lattice"](seed=0), **settings)
+        _probes(plan)(cheap)
+    if options.arrangement is not None or options.seed is not None:
+        rule = ARRANGEMENTS[options.arrangement or "packed"]
+        settings["arrangement"] = rule(seed=options.seed or 0)
+
+    def scene(reynolds, **more):
+        return make(reynolds=reynolds, **{**settings, **more})
+
+    if plan.settling is not None:
+        scene = settled(scene, plan.settling, folder / "settling", _bar)
     projections = {
         "galerkin": Galerkin(),
-        "apg": AdjointPetrovGalerkin(jax.numpy.asarray(options.tau, options.precision)),
+        "apg": AdjointPetrovGalerkin(jax.numpy.asarray(plan.tau, options.precision)),
     }
-    study = Study(
-        lambda reynolds: make(reynolds=reynolds, arrangement=arrangement, **settings),
+    return Study(
+        scene,
         folder,
         projections=tuple(projections[name] for name in dict.fromkeys(options.projection)),
         product=PRODUCTS[options.inner_product](),
         advection=ADVECTIONS[options.advection](),
         spline_order=options.spline_order,
         progress=_bar,
+        probes=_probes(plan),
+        judged_from=plan.judged_from,
     )
-    experiment = Experiment(
-        tuple(dict.fromkeys(options.train)),
-        tuple(dict.fromkeys(options.predict)),
-        tuple(dict.fromkeys(options.modes)),
-    )
-    return study, experiment
+
+
+def _probes(plan: Plan):
+    if plan.slice_at is None:
+        return lambda scene: centre_line(scene.space)
+    return lambda scene: vertical_slice(scene.space, plan.slice_at)
 
 
 @contextmanager

@@ -201,7 +201,9 @@ class WalledSearch(eqx.Module):
             largest = jnp.maximum(largest, jnp.max(count_bits(words)))
             sides.append((words, cell, around))
         overflow = (
-            (jnp.sum(within) > near.shape[0]) | particles.overflow | (largest > self.capacity)
+            (jnp.sum(within) > near.shape[0])
+            | (particles.overflow | ghosts.overflow)
+            | (largest > self.capacity)
         )
         return near, ghosts.order, sides, (overflow, largest)
 

@@ -12,13 +12,13 @@ from ..kernels import Kernel
 from ..walls import BoxRegion, MovingWall
 from .enclosed import enclosed_flow, pick_scale, positive
 from .scales import Scale
-from .scene import Scene
+from .scene import VISCOUS_LIMIT, Scene
 
 LENGTH = 0.4  # m, of the periodic direction
 SCALES = {
-    "small": Scale(resolution=50, h_over_dx=2.0, time_step=2e-3, steps_per_snapshot=10),
-    "half": Scale(resolution=100, h_over_dx=2.0, time_step=1e-3, steps_per_snapshot=20),
-    "paper": Scale(resolution=200, h_over_dx=2.0, time_step=5e-4, steps_per_snapshot=40),
+    "small": Scale(resolution=50, h_over_dx=2.0, time_step=1.6e-3, steps_per_snapshot=10),
+    "half": Scale(resolution=100, h_over_dx=2.0, time_step=4e-4, steps_per_snapshot=40),
+    "paper": Scale(resolution=200, h_over_dx=2.0, time_step=1e-4, steps_per_snapshot=160),
 }
 CHANNEL = BoxRegion((-np.inf, 0.0), (np.inf, 1.0))
 
@@ -62,7 +62,7 @@ def couette(
         ValueError: for a Reynolds number, resolution or step out of range.
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
-    chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
+    chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
     return enclosed_flow(
         "couette",
         box=channel_box(chosen),
@@ -80,6 +80,17 @@ def couette(
         kernel=kernel,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds},
+    )
+
+
+def channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step) -> Scale:
+    """The scale of a channel of unit height and speed; dt respects the viscous limit, too."""
+
+    def longest_step(scale):
+        return 0.9 * VISCOUS_LIMIT * (scale.h_over_dx / scale.resolution) ** 2 * reynolds
+
+    return pick_scale(SCALES, scale).with_overrides(
+        end_time, resolution, h_over_dx, time_step, longest_step
     )
 
 

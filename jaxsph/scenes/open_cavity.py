@@ -42,8 +42,9 @@ def open_cavity(
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
-    """A channel of 0.4 m x 0.1 m, periodic in x, over a cavity of 0.2 m x 0.1 m (paper, third
-    experiment).
+    """A channel, periodic in x, over a cavity (paper, third experiment).
+
+    The channel is 0.4 m x 0.1 m, the cavity centred below it 0.2 m x 0.1 m.
 
     Driven above the cavity by `KickAndHold`: about 98 m/s^2 for 0.01 s, then 0.1 m/s^2. rho0 =
     1 kg/m^3, U = 2 m/s, Ma = 0.1, no-slip walls. The paper gives no viscosity; it says that Re

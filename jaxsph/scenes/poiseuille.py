@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement, JitteredLattice
 from ..effects import Effect, Gravity
 from ..kernels import Kernel
-from .couette import CHANNEL, SCALES, channel_box
-from .enclosed import enclosed_flow, pick_scale, positive
+from .couette import CHANNEL, channel_box, channel_scale
+from .enclosed import enclosed_flow, positive
 from .scene import Scene
 
 
@@ -51,7 +51,7 @@ def poiseuille(
         ValueError: for a Reynolds number, resolution or step out of range.
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
-    chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
+    chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
     return enclosed_flow(
         "poiseuille",
         box=channel_box(chosen),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 
@@ -21,10 +22,12 @@ class Scale:
         resolution: int | None,
         h_over_dx: float | None,
         time_step: float | None,
+        longest_step: Callable[[Scale], float] | None = None,
     ) -> Scale:
         """This scale with what is given changed.
 
-        Unless dt is given, dt / dx is kept at most and dt divides the end time [s].
+        Unless dt is given, dt / dx is kept at most, dt is below `longest_step` of the new scale if
+        that is given, and dt divides the end time [s].
 
         Raises:
             ValueError: if a value is out of range.
@@ -41,5 +44,7 @@ class Scale:
             new = replace(new, h_over_dx=float(h_over_dx))
         if time_step is not None:
             return replace(new, time_step=float(time_step))
+        if longest_step is not None:
+            new = replace(new, time_step=min(new.time_step, longest_step(new)))
         intervals = max(1, math.ceil(end_time / (new.time_step * new.steps_per_snapshot) - 1e-9))
         return replace(new, time_step=end_time / (intervals * new.steps_per_snapshot))

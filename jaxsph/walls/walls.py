@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import final
 
@@ -145,9 +146,9 @@ def fill(region: Region, position: Float[Array, "points dim"]) -> Float[Array, "
     return position[inside]
 
 
+@partial(jax.jit, static_argnums=0)
 def _gradient(region: Region, points):
-    slope = jax.grad(lambda x: region.signed_distance(x[None, :])[0])
-    return jax.vmap(slope)(jnp.asarray(points))
+    return jax.vmap(jax.grad(lambda x: region.signed_distance(x[None, :])[0]))(points)
 
 
 def _at(point) -> str:

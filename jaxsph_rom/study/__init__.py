@@ -1,7 +1,11 @@
 """Studies: train on full runs, predict, compare, report."""
 
 from .local_bases import LocalBases as LocalBases
+from .plans import PLANS as PLANS
+from .plans import Plan as Plan
+from .recorded_run import full_run as full_run
 from .recorded_run import recorded_run as recorded_run
+from .settled import settled as settled
 from .study import Experiment as Experiment
 from .study import Outcome as Outcome
 from .study import Study as Study

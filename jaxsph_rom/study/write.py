@@ -30,37 +30,65 @@ _LISTED_MODES = (2, 5, 10, 20, 30)
 
 def write_study(
     study: Study,
-    experiment: Experiment,
+    experiments: Sequence[Experiment],
     outcomes: Sequence[Outcome],
     folder: Path,
     json_path: Path | None = None,
-    profile_time: float = 0.5,
+    profile_time: float | None = None,
 ) -> dict[str, Any]:
-    """Write `report.json` and the figures of an experiment into a folder.
+    """Write `report.json` and the figures of a study into a folder.
 
     Args:
-        study, experiment, outcomes: what was run.
+        study: made the runs.
+        experiments: each with a basis of its own; the figures of bases are numbered if there are
+            several.
+        outcomes: of all experiments.
         folder: where figures go, and the report unless `json_path` is given.
         json_path: where the report goes.
-        profile_time: at which profiles and fields are shown [s].
+        profile_time: at which profiles and fields are shown [s]; half the run if none is given.
 
     Returns:
         what the report holds beside its cases.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
+    bases = []
+    for number, experiment in enumerate(experiments):
+        suffix = f"_{number + 1}" if len(experiments) > 1 else ""
+        bases.append(_basis_figures(study, experiment, folder, suffix))
+    first = study.scene(experiments[0].trained_on[0])
+    if profile_time is None:
+        profile_time = 0.5 * first.end_time
     extra = {
-        "cumulative_energy_percent": {
-            "reference": _listed(basis.singular_values),
-            "lagrangian": _listed(lagrangian.singular_values),
-        },
-        "parameters": study.scene(experiment.trained_on[0]).parameters,
+        "bases": bases,
+        "parameters": first.parameters,
         "advection": study.advection.name,
         "spline_order": study.spline_order,
+        "judged_from": study.judged_from,
     }
+    discrepancy_history(
+        [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
+        folder / "discrepancy.png",
+    )
+    _profiles(study, outcomes, folder / "centre_line.png", profile_time)
+    if first.space.box.dim == 2:
+        _fields(study, outcomes, folder, profile_time)
+    write_report(
+        json_path or folder / "report.json",
+        [outcome.case for outcome in outcomes],
+        environment(),
+        extra,
+    )
+    return extra
+
+
+def _basis_figures(
+    study: Study, experiment: Experiment, folder: Path, suffix: str
+) -> dict[str, Any]:
+    """Singular values and modes of an experiment's basis; its cumulative energies."""
+    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
     singular_values(
-        lagrangian.singular_values, basis.singular_values, folder / "singular_values.png"
+        lagrangian.singular_values, basis.singular_values, folder / f"singular_values{suffix}.png"
     )
     numbers = tuple(n for n in _SHOWN_MODES if n <= basis.size)
     points = np.asarray(study.reference(experiment).points)
@@ -73,22 +101,15 @@ def write_study(
                 ("reference space", points, basis.modes[:, :, shown]),
             ],
             numbers,
-            folder / "modes.png",
+            folder / f"modes{suffix}.png",
         )
-    discrepancy_history(
-        [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
-        folder / "discrepancy.png",
-    )
-    _profiles(study, outcomes, folder / "centre_line.png", profile_time)
-    if points.shape[1] == 2:
-        _fields(study, outcomes, folder, profile_time)
-    write_report(
-        json_path or folder / "report.json",
-        [outcome.case for outcome in outcomes],
-        environment(),
-        extra,
-    )
-    return extra
+    return {
+        "trained_on": list(experiment.trained_on),
+        "cumulative_energy_percent": {
+            "reference": _listed(basis.singular_values),
+            "lagrangian": _listed(lagrangian.singular_values),
+        },
+    }
 
 
 def _listed(sigma: np.ndarray) -> dict[str, float]:

@@ -26,7 +26,7 @@ def test_a_study_from_one_line(tmp_path, capsys):
         assert 0 < case["velocity_median_percent"] < 5  # ten steps of a slow decay
         assert case["rom_seconds"] > 0 and case["fom_seconds"] > 0
     assert report["environment"]["versions"]["jax"]
-    energies = report["cumulative_energy_percent"]
+    energies = report["bases"][0]["cumulative_energy_percent"]
     assert energies["reference"]["2"] <= 100.0 and energies["lagrangian"]["2"] <= 100.0
     figures = {path.stem for path in tmp_path.glob("*.png")}
     assert figures == {

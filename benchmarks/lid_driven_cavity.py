@@ -1,0 +1,261 @@
+"""The lid-driven cavity beside reference solutions, and how near its particles come to walls.
+
+    python -m benchmarks.lid_driven_cavity --cases ghia
+
+Cases are named LID-RE-RESOLUTION. `ghia`: the constant lid at Re 100, 400 and 1000 against Ghia et
+al. (1982) and a converged solver (`references/lid_driven_cavity.py`), and the paper's regularised
+lid against that solver. `inside`: 20 s at three resolutions, how near particles come to walls, and
+the density. Runs are kept in a folder and finished rows in the JSON file: the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import SimulationError, Trajectory
+from jaxsph.cli import report_errors
+from jaxsph.environment import environment
+from jaxsph.io import check_target
+from jaxsph.kernels import WendlandC2
+from jaxsph.scenes import Scene, lid_driven_cavity
+from jaxsph_rom.study import full_run
+
+from .measure import format_rows, number, progress, read_json, tell, write_json
+from .references import ghia
+from .references.lid_driven_cavity import constant_lid, regularised_lid, solve
+
+LIDS = {"constant": constant_lid, "regularised": regularised_lid}
+SNAPSHOTS_PER_SECOND = 5
+TIME_STEP = {32: 3.125e-3, 50: 2e-3, 64: 1.5625e-3, 100: 2e-3}  # s; at 100 two thirds of the limit
+# name: (lid, Re, resolution, end time [s])
+SETS = {
+    "ghia": (
+        ("constant", 100, 100, 20.0),
+        ("regularised", 100, 100, 20.0),
+        ("constant", 400, 100, 40.0),
+        ("constant", 1000, 100, 60.0),
+    ),
+    "inside": tuple(
+        ("regularised", reynolds, resolution, 20.0)
+        for resolution in (32, 50, 64)
+        for reynolds in (100, 400)
+    ),
+}
+KEY = ("lid", "reynolds", "resolution", "end_time")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: a run failed, 2: bad input."""
+    return report_errors("lid_driven_cavity", _command, argv)
+
+
+def _command(argv) -> int:
+    options = _parser().parse_args(argv)
+    check_target(options.json, overwrite=True)
+    rows = (read_json(options.json) or {}).get("rows", [])
+    if any(name not in row for row in rows for name in KEY):
+        raise ValueError(f"{options.json}: holds other results; name another file.")
+    done, failed = {tuple(row[name] for name in KEY) for row in rows}, False
+    with jax.enable_x64(True):
+        for name in options.cases:
+            for values in SETS[name]:
+                if values in done:
+                    continue
+                case = dict(zip(KEY, values, strict=True))
+                tell(", ".join(f"{key} {value}" for key, value in case.items()))
+                try:
+                    row = case | run(case, options.out)
+                except SimulationError as error:
+                    tell(f"failed: {error}")
+                    row, failed = case | {"fault": str(error)}, True
+                rows.append(row)
+                done.add(values)
+                write_json(options.json, {"rows": rows, "environment": environment()})
+    print(_table(rows))
+    return int(failed)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.lid_driven_cavity", description=__doc__.splitlines()[0]
+    )
+    add = parser.add_argument
+    add("--cases", choices=tuple(SETS), nargs="+", default=list(SETS),
+        help="sets of cases (default: all)")  # fmt: skip
+    add("--out", type=Path, default=Path("out/lid-driven-cavity"), metavar="DIR",
+        help="where runs are kept (default: %(default)s)")  # fmt: skip
+    add("--json", type=Path, default=Path("benchmarks/results/lid_driven_cavity.json"),
+        metavar="FILE",
+        help="results, and what is done already (default: %(default)s)")  # fmt: skip
+    return parser
+
+
+def make_scene(case: dict[str, Any]) -> Scene:
+    """The scene of a case, with a few snapshots a second."""
+    step = TIME_STEP[case["resolution"]]
+    each = max(1, round(1.0 / (SNAPSHOTS_PER_SECOND * step)))
+    scene = lid_driven_cavity(
+        case["resolution"],
+        float(case["reynolds"]),
+        lid=case["lid"],
+        time_step=case["end_time"] / (each * round(case["end_time"] / (each * step))),
+        end_time=case["end_time"],
+    )
+    return dataclasses.replace(scene, steps_per_snapshot=each)
+
+
+def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Errors, what particles did near walls, and times of one run."""
+    scene = make_scene(case)
+    folder = folder / f"{case['lid']}-{case['resolution']}-{case['end_time']:g}s"
+
+    trajectory = full_run(folder, scene, progress)
+    metadata = trajectory.metadata
+    return {
+        **_walls(scene, trajectory),
+        **_errors(case, scene, trajectory),
+        "fault": None,
+        # of a run taken up again, extrapolated from its last part
+        "seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
+        "compile_seconds": metadata["compile_seconds"],
+        "steps": scene.steps,
+        "time_step": scene.time_step,
+        "dx": scene.space.spacing,
+        "particles": trajectory.particles,
+        "ghosts": scene.walls.position.shape[0],
+        "device": jax.devices()[0].device_kind,
+        "environment": environment(),
+    }
+
+
+def _walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Distances to walls and densities over all snapshots.
+
+    A particle counts as stuck if it stays nearer than 0.25 dx to a wall for a second. (That none is
+    beyond a wall is checked after every step of the run.)
+    """
+    region, dx = scene.walls.fluid_region, scene.space.spacing
+    distance = jax.jit(lambda x: -region.signed_distance(x) / dx)
+    over_dx = np.stack([np.asarray(distance(jnp.asarray(x))) for x in trajectory.position])
+    near = over_dx < 0.25
+    longest, lasting = np.zeros(near.shape[1], int), np.zeros(near.shape[1], int)
+    for row in near:
+        lasting = np.where(row, lasting + 1, 0)
+        longest = np.maximum(longest, lasting)
+    every = float(trajectory.time[1] - trajectory.time[0])
+    ratio = trajectory.density / float(scene.fluid.reference_density)
+    return {
+        "nearest_to_wall_over_dx": float(over_dx.min()),
+        "beyond_wall": int((over_dx < 0.0).sum()),
+        "longest_stay_within_quarter_dx": float(longest.max() * every),
+        "stuck": int((longest * every >= 1.0).sum()),
+        "density_low": float(ratio.min()),
+        "density_high": float(ratio.max()),
+    }
+
+
+def _errors(case, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Largest deviations on the centre lines, in percent of the lid's speed, at the end.
+
+    The velocity is the mean over the last second, by local linear fits.
+    """
+    vertical = np.stack([np.full(len(ghia.VERTICAL_Y), 0.5), ghia.VERTICAL_Y], axis=1)
+    horizontal = np.stack([ghia.HORIZONTAL_X, np.full(len(ghia.HORIZONTAL_X), 0.5)], axis=1)
+    last = np.flatnonzero(trajectory.time > trajectory.time[-1] - 1.0)
+
+    def found(points, component):
+        inside = (points > 0.0).all(axis=1) & (points < 1.0).all(axis=1)
+        values = [
+            local_linear(
+                points[inside],
+                trajectory.position[k],
+                trajectory.velocity[k][:, component],
+                scene.space.smoothing_length,
+            )
+            for k in last
+        ]
+        return inside, np.mean(values, axis=0)
+
+    exact = solve(case["reynolds"], LIDS[case["lid"]])
+    (on_u, u), (on_v, v) = found(vertical, 0), found(horizontal, 1)
+    reference_u = exact.velocity(vertical[on_u])[:, 0]
+    reference_v = exact.velocity(horizontal[on_v])[:, 1]
+    errors = {
+        "u_error_percent": float(100.0 * np.abs(u - reference_u).max()),
+        "v_error_percent": float(100.0 * np.abs(v - reference_v).max()),
+        "change_in_last_second_percent": _change(trajectory),
+        "profiles": {
+            "y": vertical[on_u, 1], "u": u, "u_reference": reference_u,
+            "x": horizontal[on_v, 0], "v": v, "v_reference": reference_v,
+        },
+    }  # fmt: skip
+    if case["lid"] == "constant" and case["reynolds"] in ghia.U:
+        apart_u = np.abs(u - _table_column("u", case["reynolds"])[on_u])
+        apart_v = np.abs(v - _table_column("v", case["reynolds"])[on_v])
+        errors |= {
+            "ghia_u_error_percent": float(100.0 * np.nanmax(apart_u)),
+            "ghia_v_error_percent": float(100.0 * np.nanmax(apart_v)),
+            "ghia_errors_by_point_percent": {
+                "y": vertical[on_u, 1], "u": 100.0 * apart_u,
+                "x": horizontal[on_v, 0], "v": 100.0 * apart_v,
+            },
+        }  # fmt: skip
+    return errors
+
+
+def _table_column(component: str, reynolds: int) -> np.ndarray:
+    """A column of Ghia's tables, NaN where an entry is a misprint."""
+    column = np.array({"u": ghia.U, "v": ghia.V}[component][reynolds])
+    column[[k for name, number, k in ghia.MISPRINTS if (name, number) == (component, reynolds)]] = (
+        np.nan
+    )
+    return column
+
+
+def _change(trajectory: Trajectory) -> float:
+    """Relative change of the kinetic energy over the last second [%]."""
+    energy = (trajectory.velocity.astype(float) ** 2).sum(axis=(1, 2))
+    before = trajectory.nearest(float(trajectory.time[-1]) - 1.0)
+    return float(100.0 * abs(energy[-1] - energy[before]) / energy[-1])
+
+
+def local_linear(
+    points: np.ndarray, position: np.ndarray, values: np.ndarray, smoothing_length: float
+) -> np.ndarray:
+    """Values (P,) at points by kernel-weighted linear least squares; exact for linear fields."""
+    out = np.empty(len(points))
+    kernel = WendlandC2()
+    for k, point in enumerate(points):
+        offset = position - point
+        distance = np.linalg.norm(offset, axis=1)
+        near = distance < kernel.support * smoothing_length
+        weight = np.sqrt(np.asarray(kernel.value(jnp.asarray(distance[near]), smoothing_length, 2)))
+        columns = np.concatenate([np.ones((near.sum(), 1)), offset[near] / smoothing_length], 1)
+        out[k] = np.linalg.lstsq(columns * weight[:, None], values[near] * weight, rcond=None)[0][0]
+    return out
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    header = ("lid", "Re", "side", "t s", "u %", "v %", "Ghia u %", "Ghia v %", "nearest/dx",
+              "stuck", "density", "run s")  # fmt: skip
+    cells = []
+    for row in rows:
+        low, high = row.get("density_low"), row.get("density_high")
+        cells.append((
+            row["lid"], str(row["reynolds"]), str(row["resolution"]), number(row["end_time"]),
+            *(number(row.get(f"{name}_error_percent")) for name in ("u", "v", "ghia_u", "ghia_v")),
+            number(row.get("nearest_to_wall_over_dx")), str(row.get("stuck", "-")),
+            f"{number(low, 4)}-{number(high, 4)}", number(row.get("seconds")),
+        ))  # fmt: skip
+    return format_rows(header, cells)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
