@@ -32,7 +32,7 @@ from .measure import format_rows, number, progress, read_json, tell, write_json
 REYNOLDS = 10.0
 SNAPSHOTS = 40
 KEY = ("flow", "resolution", "h_over_dx", "arrangement", "wall_velocity", "layers", "end_time")
-ARRANGEMENTS = {"lattice": Lattice(), "jittered": JitteredLattice(amplitude=0.3)}
+ARRANGEMENTS = {"lattice": Lattice(), "jittered": JitteredLattice(amplitude=0.25)}
 WALLS = {"no-slip": NoSlip(), "fixed": FixedWallVelocity()}
 
 

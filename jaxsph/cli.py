@@ -30,6 +30,7 @@ from .io import (
 from .metrics import kinetic_energy
 from .scenes import SCENES, Scene
 from .scenes import taylor_green_solution as taylor_green_exact
+from .scenes.lid_driven_cavity import LIDS
 from .scenes.record import scene_from_record
 from .simulate import simulate
 from .trajectory import Trajectory
@@ -46,6 +47,7 @@ _SCENE_OPTIONS = {
     "time_step": "time_step",
     "arrangement": "arrangement",
     "seed": "arrangement",
+    "lid": "lid",
     "precision": "dtype",
 }
 
@@ -139,8 +141,13 @@ def _parser() -> Parser:
     add("--scale", choices=SCALES, help="size of the run (default: small)")
     add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
     add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
-    add("--arrangement", choices=tuple(ARRANGEMENTS), help="how particles start (default: packed)")
+    add(
+        "--arrangement",
+        choices=tuple(ARRANGEMENTS),
+        help="how particles start (default: the scene's)",
+    )
     add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
+    add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
     add("--precision", choices=("float32", "float64"), help="default: float64")
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder for trajectory.h5 (default: out/SCENE)")

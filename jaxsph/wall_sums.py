@@ -81,7 +81,7 @@ def wall_sums(
 def _table(names, fields, ghosts, pairs: WallPairs) -> dict[str, Array]:
     """Fields of the rows of `pairs`; zero where only the other kind of particle has the field."""
     table = {}
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys(n for n in names if n in fields or n in ghosts):
         fluid, ghost = fields.get(name), ghosts.get(name)
         if fluid is not None:
             fluid = fluid.at[pairs.near].get(mode="promise_in_bounds", unique_indices=True)

@@ -56,7 +56,16 @@ class Packed(Arrangement):
         return _packed(self, space, jnp.zeros(()).dtype)
 
     def pack(self, space):
-        """Packed positions, the residual reached and the number of iterations it took."""
+        """Packed positions, the residual reached and the number of iterations it took.
+
+        Raises:
+            ValueError: if the box is closed in a direction, as packing knows no walls.
+        """
+        if not all(space.box.periodic):
+            raise ValueError(
+                "arrangement: packing needs a box that is periodic all round; between walls start "
+                "on a lattice or a jittered lattice."
+            )
         start = JitteredLattice(seed=self.seed).positions(space)
         dx = space.spacing
         search = NeighborSearch.allocate(start, space.box, space.support, _SKIN * dx, margin=1.3)

@@ -7,18 +7,19 @@ import jax.numpy as jnp
 from ..walls.region import Region
 from .base import Effect
 
-_RANGE = 0.25  # times dx; a particle at rest beside a wall is half a spacing away
+_RANGE = 0.15  # times dx; a particle at rest beside a wall is half a spacing away
 _STRENGTH = 0.2  # holds a particle that flies at the wall with up to c0 sqrt(strength range / 1.5)
 
 
 class WallRepulsion(Effect):
     """du_i/dt = A c0^2 / dx (1 - d_i / a)^2 n_i where d_i < a, and nothing beyond:
 
-    d_i is the particle's distance to the wall, n_i the wall's normal, a = dx / 4, A = 0.2. Pressure
-    alone keeps particles half a spacing away from flat walls; where a flow turns sharply around an
-    edge, some would cut the corner. The force has a potential, so it holds every particle whose
-    speed towards the wall is below c0 (2 A a / (3 dx))^(1/2), 0.18 c0. Short-range boundary forces
-    go back to Monaghan (1994).
+    d_i is the particle's distance to the wall, n_i the wall's normal, a = 0.15 dx, A = 0.2.
+    Pressure alone keeps particles half a spacing away from flat walls; where a flow turns sharply
+    around an edge, some would cut the corner. The force has a potential, so it holds every particle
+    whose speed towards the wall is below c0 (2 A a / (3 dx))^(1/2), 0.14 c0. (A longer reach was
+    seen to disturb the density beside a lid.) Short-range boundary forces go back to Monaghan
+    (1994).
 
     Args:
         fluid_region: where fluid may be (static).

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrangements import Arrangement, JitteredLattice
 from ..domain import Box
-from ..effects import Effect
+from ..effects import Effect, NoSlip
 from ..kernels import Kernel
 from ..walls import BoxRegion, MovingWall
 from .enclosed import enclosed_flow, pick_scale, positive
@@ -63,6 +63,7 @@ def couette(
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
     chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
+    wall_velocity = NoSlip() if wall_velocity is None else wall_velocity
     return enclosed_flow(
         "couette",
         box=channel_box(chosen),
@@ -76,10 +77,14 @@ def couette(
         viscosity=1.0 / reynolds,
         wall_velocity=wall_velocity,
         layers=layers,
-        arrangement=JitteredLattice(amplitude=0.3) if arrangement is None else arrangement,
+        arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds},
+        parameters={
+            "scale": scale,
+            "reynolds": reynolds,
+            "wall_velocity": wall_velocity.name,
+        },
     )
 
 

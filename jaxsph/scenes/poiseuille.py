@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from ..arrangements import Arrangement, JitteredLattice
-from ..effects import Effect, Gravity
+from ..effects import Effect, Gravity, NoSlip
 from ..kernels import Kernel
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
@@ -52,6 +52,7 @@ def poiseuille(
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
     chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
+    wall_velocity = NoSlip() if wall_velocity is None else wall_velocity
     return enclosed_flow(
         "poiseuille",
         box=channel_box(chosen),
@@ -65,8 +66,12 @@ def poiseuille(
         viscosity=1.0 / reynolds,
         wall_velocity=wall_velocity,
         layers=layers,
-        arrangement=JitteredLattice(amplitude=0.3) if arrangement is None else arrangement,
+        arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds},
+        parameters={
+            "scale": scale,
+            "reynolds": reynolds,
+            "wall_velocity": wall_velocity.name,
+        },
     )

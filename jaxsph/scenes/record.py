@@ -6,8 +6,9 @@ import dataclasses
 import inspect
 from typing import Any
 
-from .. import arrangements, kernels
+from .. import arrangements, effects, kernels
 from ..arrangements import Arrangement
+from ..effects import Effect
 from ..kernels import Kernel
 from .scene import Scene
 
@@ -40,6 +41,8 @@ def scene_from_record(
     options = dict(parameters)
     if "kernel" in options:
         options["kernel"] = _named(kernels, Kernel, options["kernel"])()
+    if "wall_velocity" in options:
+        options["wall_velocity"] = _named(effects, Effect, options["wall_velocity"])()
     if arrangement is not None:
         options["arrangement"] = arrangement
     elif "arrangement" in options:
