@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -85,6 +86,9 @@ def _parser() -> Parser:
     add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
     add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
     add("--t-end", type=positive_float, metavar="T", help="end time [s]")
+    add("--settling", type=positive_float, metavar="T",
+        help="time a run from rest takes before the studied time begins [s] "
+        f"({_defaults('settling')}; other scenes start from rest)")  # fmt: skip
     add("--slice", type=float, dest="slice_at", metavar="X",
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
         "0.25)")  # fmt: skip
@@ -152,7 +156,7 @@ def _plan(options) -> Plan:
     for name in ("train", "predict", "modes", "borders"):
         if getattr(options, name) is not None:
             given[name] = tuple(dict.fromkeys(getattr(options, name)))
-    for name in ("tau", "slice_at"):
+    for name in ("tau", "slice_at", "settling"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     if {"train", "predict"} & set(given) and "borders" not in given:
@@ -189,6 +193,8 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         return make(reynolds=reynolds, **{**settings, **more})
 
     if plan.settling is not None:
+        if "start_time" not in inspect.signature(make).parameters:
+            raise ValueError(f"--settling: scene {options.scene} starts from rest; leave it out.")
         scene = settled(scene, plan.settling, folder / "settling", _bar)
     projections = {
         "galerkin": Galerkin(),

@@ -25,7 +25,7 @@ from .field_advection import Advection, PaperAdvection
 from .projection import Projection, PseudoInverse
 from .splines import LocalSplines
 
-_REACH = 0.5  # times dx: the part of a wall's neighbourhood where particles are slowed
+_MARGIN = 0.25  # times dx: no particle comes nearer to a wall
 
 
 class ReducedState(eqx.Module):
@@ -40,9 +40,9 @@ class ReducedModel(Model):
 
         d(w^)/dt = projection of f-bar(Phi~(x) w^),    dx/dt = u~ + du~.
 
-    Near walls the particles' velocity towards the wall fades out, as modes do not keep particles
-    inside. It runs in the full model's loop. At every stage the modes are carried to the particles
-    by local splines, so its cost is that of a full right-hand side and more.
+    As modes do not keep particles inside walls, those that come too near are put back after each
+    step. It runs in the full model's loop. At every stage the modes are carried to the particles by
+    local splines, so its cost is that of a full right-hand side and more.
 
     Args:
         functional: f-bar, the Eulerian SPH functional.
@@ -135,18 +135,14 @@ class ReducedModel(Model):
         coordinates = self.projection.reduce(
             self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates
         )
-        return ReducedState(coordinates, self._transport(state.position, transport))
-
-    def _transport(self, position, velocity):
-        """The velocity of the particles; modes carry some of it through walls."""
-        walls = self.functional.walls
-        if walls is None:
-            return velocity
-        return walls.keep_inside(position, velocity, _REACH * self.functional.space.spacing)
+        return ReducedState(coordinates, transport)
 
     def finish(self, state):
-        box = self.functional.space.box
-        return eqx.tree_at(lambda s: s.position, state, box.wrap(state.position))
+        space, walls = self.functional.space, self.functional.walls
+        position = space.box.wrap(state.position)
+        if walls is not None:
+            position = walls.put_inside(position, _MARGIN * space.spacing)
+        return eqx.tree_at(lambda s: s.position, state, position)
 
     def inspect(self, step, state, auxiliary):
         position, coordinates = state.position, state.coordinates

@@ -6,10 +6,14 @@ from pathlib import Path
 README = Path(__file__).parents[1] / "README.md"
 
 
-def test_the_python_example_runs(capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
-    exec(compile(code, "README.md", "exec"), {})
+def test_the_python_examples_run(capsys):
+    flow, vessel = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    exec(compile(flow, "README.md", "exec"), {})
     shown = capsys.readouterr().out
+    names = {}
+    exec(compile(vessel, "README.md", "exec"), names)
+    distance = ((names["walls"].position - 1.0) ** 2).sum(axis=1) ** 0.5
+    assert 1.0 <= float(distance.min()) and float(distance.max()) < 1.2  # four layers of dx
     assert "LaminarViscosity" in shown and "576, 2" in shown
     assert float(shown.split()[-1]) < 0.0  # viscosity takes energy from the flow
 

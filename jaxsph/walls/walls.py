@@ -113,23 +113,20 @@ class Walls(eqx.Module):
         """Which particles are inside a wall."""
         return self.fluid_region.signed_distance(position) > 0.0
 
-    def keep_inside(
-        self,
-        position: Float[Array, "particles dim"],
-        velocity: Float[Array, "particles dim"],
-        reach: float,
+    def put_inside(
+        self, position: Float[Array, "particles dim"], margin: float
     ) -> Float[Array, "particles dim"]:
-        """Velocities whose part towards a wall fades out within `reach` [m] of it:
+        """Positions [m], those nearer than `margin` [m] to a wall or beyond it put back that far.
 
-        u - (1 - s) min(u . n, 0) n,    s = clip(d / reach, 0, 1),
-
-        d the distance to the wall, n its normal. No particle that moves so passes the wall.
+        Each is moved along the signed distance's gradient, in turn for each wall of a corner.
         """
-        outward = _gradient(self.fluid_region, position)
-        distance = -self.fluid_region.signed_distance(position)
-        approach = jnp.maximum(jnp.sum(velocity * outward, axis=1), 0.0)
-        fade = 1.0 - jnp.clip(distance / reach, 0.0, 1.0)
-        return velocity - (fade * approach)[:, None] * outward
+        for _ in range(position.shape[1] + 1):  # out of the corner, then off each of its walls
+            excess = jnp.maximum(self.fluid_region.signed_distance(position) + margin, 0.0)
+            outward = _gradient(self.fluid_region, position)
+            squared = jnp.sum(outward * outward, axis=1)
+            move = excess / jnp.where(squared > 0.0, squared, 1.0)
+            position = position - move[:, None] * outward
+        return position
 
 
 def fill(region: Region, position: Float[Array, "points dim"]) -> Float[Array, "particles dim"]:
