@@ -29,14 +29,12 @@ from jaxsph.effects import (
     FixedWallVelocity,
     FreeSlip,
     Gravity,
-    KickAndHold,
     LaminarViscosity,
     NoSlip,
     ParticleShifting,
     PressureForce,
     ShiftingTransport,
     WallPressure,
-    WallRepulsion,
 )
 from jaxsph.kernels import WendlandC2
 from jaxsph.neighbors import WallPairs
@@ -447,74 +445,3 @@ def rates_and_slopes(state, walls):
         return sum(jnp.sum(leaf) for leaf in jax.tree.leaves(rates))
 
     return total(state)
-
-
-# ------------------------------------------------------------------ repulsion
-
-
-def repulsion(region, position):
-    space = make_space(CLOSED)
-    context = Context(jnp.asarray(0.0), FLUID, jnp.asarray(RHO0 * DX**2), space)
-    fields = {"position": jnp.asarray(position)}
-    return np.asarray(WallRepulsion(region).rates(context, fields, {})["velocity"])
-
-
-def test_repulsion_acts_next_to_walls_only_and_away_from_them():
-    found = repulsion(make_walls(CLOSED).fluid_region, lattice())
-    np.testing.assert_array_equal(found, 0.0)  # half a spacing away, and farther
-    edge = ~BoxRegion((0.0, 0.0), (0.5, 0.5))  # solid, its corner juts into the fluid
-    x = np.asarray([[0.25, 0.5 + 0.1 * DX], [0.5 + 0.06 * DX, 0.5 + 0.08 * DX], [0.7, 0.7]])
-    found = repulsion(edge, x)
-    assert np.all(found[2] == 0.0)
-    normal = np.asarray([[0.0, 1.0], [0.6, 0.8]])  # from the nearest point of the solid
-    strength = 0.2 * C0**2 / DX * (1.0 - 0.1 / 0.15) ** 2  # both are 0.1 dx away
-    np.testing.assert_allclose(found[:2], strength * normal, rtol=1e-11)  # distances of 1e-2
-
-
-def test_repulsion_holds_what_flies_at_a_wall_with_up_to_a_seventh_of_the_speed_of_sound():
-    region, count = make_walls(CLOSED).fluid_region, 2001
-    depth = np.linspace(0.0, 0.2 * DX, count)
-    x = np.stack([np.full(count, 0.5), depth], axis=1)
-    force = repulsion(region, x)[:, 1]
-    assert np.all(np.diff(force) <= 0.0) and force[-1] == 0.0
-    work = np.trapezoid(force, depth)
-    # v^2 / 2 = A a c0^2 / (3 dx); quadrature of a parabola with 1500 intervals: 1e-6
-    assert np.sqrt(2.0 * work) == pytest.approx(np.sqrt(0.02) * C0, rel=1e-6)
-
-
-# ------------------------------------------------------------------ body forces
-
-
-def test_the_kick_and_what_is_held_after_it():
-    kick = KickAndHold(100.0, 400.0, 0.01, 0.001, (0.1, 0.0), (0.3, 0.1))
-    inside = jnp.asarray([[0.2, 0.05]])
-
-    def strength(time):
-        return float(kick.acceleration(jnp.asarray(time), inside)[0, 0])
-
-    for time in (0.0, 0.005, 0.01, 0.013, 0.02, 1.0):  # the paper's formula, with f = -t
-        exact = 100.0 * (1.0 / (1.0 + np.exp(-400.0 * (0.01 - time))) + 0.001)
-        assert strength(time) == pytest.approx(exact, rel=1e-12)  # round-off
-    assert strength(0.0) == pytest.approx(98.3, abs=0.02)
-    assert strength(0.01) == pytest.approx(50.1, rel=1e-12)  # half of it
-    assert strength(0.05) == pytest.approx(0.1, rel=2e-4)  # exp(-16) of 1000
-    assert strength(1e6) == pytest.approx(0.1, rel=1e-12)
-
-
-def test_the_kick_acts_in_its_box_only_and_along_the_first_axis():
-    kick = KickAndHold(100.0, 400.0, 0.01, 0.001, (0.1, 0.0), (0.3, 0.1))
-    x = jnp.asarray(np.random.default_rng(0).uniform([0.0, -0.1], [0.4, 0.1], (300, 2)))
-    found = np.asarray(kick.acceleration(jnp.asarray(0.0), x))
-    inside = np.asarray((x[:, 0] > 0.1) & (x[:, 0] < 0.3) & (x[:, 1] > 0.0))
-    assert 30 < inside.sum() < 120
-    np.testing.assert_array_equal(found[:, 1], 0.0)
-    np.testing.assert_array_equal(found[~inside, 0], 0.0)
-    assert np.all(found[inside, 0] > 98.0)
-    single = kick.acceleration(jnp.asarray(0.0, jnp.float32), x.astype(jnp.float32))
-    assert single.dtype == jnp.float32
-
-
-def test_gravity_is_the_same_everywhere():
-    b = jnp.asarray([0.5, -9.81, 0.0])
-    found = Gravity(b).acceleration(jnp.asarray(3.0), jnp.ones((4, 3)))
-    np.testing.assert_array_equal(found, np.broadcast_to(b, (4, 3)))
