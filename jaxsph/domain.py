@@ -28,6 +28,8 @@ class Box:
     periodic: tuple[bool, ...]
 
     def __post_init__(self):
+        for name in ("lower", "upper"):  # not numpy's floats, whose dtype would spread
+            object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
         if not (len(self.lower) == len(self.upper) == len(self.periodic) in (2, 3)):
             raise ValueError(
                 f"Box: lower, upper and periodic need 2 or 3 entries each, got {self}."

@@ -48,8 +48,8 @@ class FullModel(Model):
     def inspect(self, step, state, auxiliary):
         return Fault.first_of(
             step,
-            *field_checks(state, self.functional.fluid.reference_density),
             *wall_checks(self.functional.walls, state.position),
+            *field_checks(state, self.functional.fluid.reference_density),
             *list_checks(self.search, auxiliary, state.position),
         )
 

@@ -22,6 +22,7 @@ def ghost_moment(pair, i, j):
     return pair.separation * (-j.density * pair.kernel)
 
 
+_REACHED = 1e-20  # of W(dx): so little that a ghost's values do not jump as particles come
 GHOST_WEIGHT = PairTerm("ghost_weight", (), ghost_weight)
 
 
@@ -57,5 +58,5 @@ class WallPressure(Effect):
 
 def per_weight(total, weight, space):
     """total / weight, and 0 for a ghost that no fluid particle reaches."""
-    reached = weight > 1e-6 * space.kernel_at_spacing
+    reached = weight > _REACHED * space.kernel_at_spacing
     return jnp.where(reached, total / jnp.where(reached, weight, 1.0), 0.0)

@@ -3,16 +3,18 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from ..walls.region import Region
 from .base import Effect
 
 _RANGE = 0.15  # times dx; a particle at rest beside a wall is half a spacing away
+_ASIDE = 1e-3  # times dx
 _STRENGTH = 0.2  # holds a particle that flies at the wall with up to c0 sqrt(strength range / 1.5)
 
 
 class WallRepulsion(Effect):
-    """du_i/dt = A c0^2 / dx (1 - d_i / a)^2 n_i where d_i < a, and nothing beyond:
+    """du_i/dt = A c0^2 / dx (1 - d_i / a)^2 n_i where d_i < a, and nothing farther from walls:
 
     d_i is the particle's distance to the wall, n_i the wall's normal, a = 0.15 dx, A = 0.2.
     Pressure alone keeps particles half a spacing away from flat walls; where a flow turns sharply
@@ -28,9 +30,12 @@ class WallRepulsion(Effect):
     fluid_region: Region = eqx.field(static=True)
 
     def rates(self, context, fields, sums):
-        distance = self.fluid_region.signed_distance
-        outward = jax.vmap(jax.grad(lambda x: distance(x[None, :])[0]))(fields["position"])
-        depth = distance(fields["position"]) / (_RANGE * context.space.spacing)
-        closeness = jnp.maximum(1.0 + depth, 0.0)
-        strength = _STRENGTH * context.fluid.sound_speed**2 / context.space.spacing
+        distance, spacing = self.fluid_region.signed_distance, context.space.spacing
+        position, reach = fields["position"], _RANGE * spacing
+        # a distance has no slope in the middle of a vessel, where a lattice may have a particle
+        far = distance(lax.stop_gradient(position)) <= -reach
+        position = position + jnp.where(far, _ASIDE * spacing, 0.0)[:, None]
+        closeness = jnp.where(far, 0.0, jnp.maximum(1.0 + distance(position) / reach, 0.0))
+        outward = jax.vmap(jax.grad(lambda x: distance(x[None, :])[0]))(position)
+        strength = _STRENGTH * context.fluid.sound_speed**2 / spacing
         return {"velocity": -(strength * closeness**2)[:, None] * outward}

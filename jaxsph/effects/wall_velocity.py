@@ -22,8 +22,9 @@ def _near_velocity(sums, space):
 class NoSlip(Effect):
     """u_i = 2 u_w - <u>_i at ghost i (Adami et al. 2012, eq. 23), u_w the wall's velocity:
 
-    the fluid's velocity, extrapolated through the wall's own at the surface. With u_w = 0 this is
-    the paper's no-slip line, the tangential part reversed.
+    the fluid's velocity, extrapolated through the wall's own at the surface. The paper reverses the
+    tangential part only; the normal part plays no role in a viscous sum beside a wall that keeps it
+    near zero.
     """
 
     def ghost_terms(self, space):

@@ -68,6 +68,7 @@ def couette(
         "couette",
         box=channel_box(chosen),
         fluid_region=CHANNEL,
+        side=1.0,
         moving=(MovingWall(BoxRegion((-np.inf, 1.0), (np.inf, np.inf)), _sliding),),
         scale=chosen,
         end_time=end_time,

@@ -46,6 +46,7 @@ def enclosed_flow(
     reference_speed: float,
     mach: float,
     viscosity: float,
+    side: float | None = None,
     moving: Sequence[MovingWall] = (),
     force: Callable[[Any], BodyForce] | None = None,
     wall_velocity: Effect | None = None,
@@ -62,12 +63,13 @@ def enclosed_flow(
         name: of the scene.
         box: around the fluid; its closed directions end at walls.
         fluid_region: where fluid may be.
-        scale: resolution (particles per longest side of the box), h/dx and steps.
+        scale: resolution, h/dx and steps.
         end_time: [s].
         reference_density: rho0 [kg/m^3].
         reference_speed: U [m/s].
         mach: U / c0.
         viscosity: nu [m^2/s].
+        side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
         force: makes the body force in a given dtype, if there is one.
         wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given.
@@ -87,7 +89,7 @@ def enclosed_flow(
     kernel = WendlandC2() if kernel is None else kernel
     arrangement = Lattice() if arrangement is None else arrangement
     dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
-    dx = max(box.lengths) / scale.resolution
+    dx = (max(box.lengths) if side is None else side) / scale.resolution
     space = Space(box, kernel, scale.h_over_dx * dx, dx)
     space.check()
     fluid = Fluid(*(
@@ -95,7 +97,7 @@ def enclosed_flow(
     ))  # fmt: skip
     drive = None if force is None else force(dtype)
     walls = Walls.around(fluid_region, space, moving, layers)
-    position = fill(fluid_region, arrangement.positions(space))
+    position = fill(fluid_region, Lattice().positions(space), arrangement.positions(space))
     start = jnp.zeros(position.shape[0]) if pressure is None else pressure(position)
     density = reference_density + start * (mach / reference_speed) ** 2
     return Scene(

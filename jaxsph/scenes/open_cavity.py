@@ -52,7 +52,8 @@ def open_cavity(
     speed U_b = 0.43 m/s that the settled flow was measured to have at Re = 2400.
 
     Args:
-        resolution: particles per 0.4 m; overrides the scale's, time step scaled along.
+        resolution: particles per 0.4 m, a multiple of 4; overrides the scale's, time step scaled
+            along.
         reynolds: Reynolds number.
         scale: `small` (dx = 2.5 mm), `half` (2 mm) or `paper` (1 mm).
         h_over_dx: smoothing length over spacing; overrides the scale's.
@@ -69,6 +70,11 @@ def open_cavity(
         ValueError: for a Reynolds number, resolution or step out of range.
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
+    if resolution is not None and resolution % 4:
+        raise ValueError(
+            f"resolution: {resolution} particles per 0.4 m put walls askew to the lattice; give a "
+            "multiple of 4."
+        )
     chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
 
     def drive(dtype):

@@ -57,6 +57,7 @@ def poiseuille(
         "poiseuille",
         box=channel_box(chosen),
         fluid_region=CHANNEL,
+        side=1.0,
         force=lambda dtype: Gravity(jnp.asarray([8.0 / reynolds, 0.0], dtype)),
         scale=chosen,
         end_time=end_time,

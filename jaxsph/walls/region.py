@@ -44,6 +44,8 @@ class BoxRegion(Region):
     upper: tuple[float, ...]
 
     def __post_init__(self):
+        for name in ("lower", "upper"):  # not numpy's floats, whose dtype would spread
+            object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
         if len(self.lower) != len(self.upper) or not all(
             a < b for a, b in zip(self.lower, self.upper, strict=True)
         ):

@@ -71,7 +71,8 @@ class Walls(eqx.Module):
                 three leave a particle beside the wall a support that is not full.
 
         Raises:
-            ValueError: for a gap in the walls, a wall too thin, or a moving part without a wall.
+            ValueError: for a gap in the walls, a wall too thin, or a moving part without a wall or
+                that does not move along it.
         """
         full = math.ceil(space.support / space.spacing - 1e-9)
         layers = full if layers is None else layers
@@ -107,6 +108,12 @@ class Walls(eqx.Module):
                     "its part cover ghosts beyond the fluid."
                 )
             velocity[held] = np.asarray(lid.velocity(jnp.asarray(ghosts[held])))
+        across = np.abs((velocity * normal).sum(axis=1))
+        if across.max() > 1e-6 * np.abs(velocity).max():
+            raise ValueError(
+                f"moving wall: at {_at(ghosts[int(np.argmax(across))])} its velocity has a part of "
+                f"{across.max():.3g} m/s across the wall; walls slide along themselves only."
+            )
         return cls(jnp.asarray(ghosts), jnp.asarray(normal), jnp.asarray(velocity), fluid_region)
 
     def beyond(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
@@ -124,18 +131,35 @@ class Walls(eqx.Module):
             excess = jnp.maximum(self.fluid_region.signed_distance(position) + margin, 0.0)
             outward = _gradient(self.fluid_region, position)
             squared = jnp.sum(outward * outward, axis=1)
-            move = excess / jnp.where(squared > 0.0, squared, 1.0)
-            position = position - move[:, None] * outward
+            near = (excess > 0.0) & (squared > 0.0)
+            move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
+            position = position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
         return position
 
 
-def fill(region: Region, position: Float[Array, "points dim"]) -> Float[Array, "particles dim"]:
-    """Those of the positions that lie in a region of fluid.
+def fill(
+    region: Region,
+    lattice: Float[Array, "points dim"],
+    position: Float[Array, "points dim"] | None = None,
+) -> Float[Array, "particles dim"]:
+    """Those places of a lattice that lie in a region of fluid.
+
+    Args:
+        region: of fluid.
+        lattice: places [m].
+        position: of a particle for each place [m], to be taken instead; one that has been moved
+            into a wall is not left out but refused by its scene.
 
     Raises:
-        ValueError: if none does.
+        ValueError: if there is none, or there are not as many positions as places.
     """
-    inside = np.asarray(region.signed_distance(position)) < 0.0
+    position = lattice if position is None else position
+    if position.shape != lattice.shape:
+        raise ValueError(
+            f"arrangement: gives {position.shape[0]} particles for a box with {lattice.shape[0]} "
+            "places; give one for each."
+        )
+    inside = np.asarray(region.signed_distance(lattice)) < 0.0
     if not inside.any():
         raise ValueError(
             "fluid: no particle lies in the region; raise the resolution or check the region."

@@ -172,6 +172,7 @@ def test_list_stays_complete_while_no_one_moves_more_than_half_the_skin(box, see
     assert motion == pytest.approx(0.5 * SKIN, rel=1e-9)  # round-off of coordinates
 
 
+@pytest.mark.slow
 def test_single_precision():
     box = BOXES["channel"]
     search = roomy(box)
@@ -207,8 +208,8 @@ def test_the_fluid_has_its_own_complete_list():
 LIMITS = {  # one capacity below what random particles need
     "particles near walls": {"near_capacity": 12},
     "partners": {"capacity": 4},
-    "particles in a cell": {"near_cell_capacity": 2},
     "ghosts in a cell": {"ghost_cell_capacity": 2},
+    "particles in a cell": {"near_cell_capacity": 2},
 }
 
 
