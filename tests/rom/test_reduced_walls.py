@@ -144,7 +144,7 @@ def test_a_settled_start_goes_on_from_the_run_from_rest(tmp_path):
 
 
 def test_local_bases_from_one_line(tmp_path, capsys):
-    arguments = ["run", "lid-driven-cavity", "--resolution", "12", "--t-end", "0.16",
+    arguments = ["run", "lid-driven-cavity", "--resolution", "12", "--t-end", "0.08",
                  "--train", "50", "100", "150", "--predict", "75", "125", "--modes", "2",
                  "--borders", "50", "100", "150", "--slice", "0.25",
                  "--out", str(tmp_path)]  # fmt: skip

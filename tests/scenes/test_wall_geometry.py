@@ -40,7 +40,7 @@ def test_a_lid_that_moves_into_its_wall_is_refused():
     lid = MovingWall(
         BoxRegion((-np.inf, 1.0), (np.inf, np.inf)), lambda x: jnp.zeros_like(x).at[:, 1].set(1.0)
     )
-    with pytest.raises(ValueError, match="across the wall; walls slide along themselves"):
+    with pytest.raises(ValueError, match="across the wall; walls slide along themselves only"):
         Walls.around(BoxRegion((0.0, 0.0), (1.0, 1.0)), space, (lid,))
 
 

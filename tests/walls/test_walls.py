@@ -140,15 +140,18 @@ def test_only_the_lid_moves_and_only_over_the_fluid(lid):
 
 
 def test_parts_move_each_with_its_own_velocity():
-    def turning(x):
-        return jnp.stack([-x[:, 1], x[:, 0]], axis=1)
+    def rising(x):
+        return jnp.stack([jnp.zeros_like(x[:, 0]), 1.0 + x[:, 1] ** 2], axis=1)
+
+    def falling(x):
+        return jnp.stack([jnp.zeros_like(x[:, 0]), -x[:, 0]], axis=1)
 
     left, right = BoxRegion((-1.0, -1.0), (0.0, 2.0)), BoxRegion((1.0, -1.0), (2.0, 2.0))
-    parts = (MovingWall(left, lambda x: jnp.ones_like(x)), MovingWall(right, turning))
+    parts = (MovingWall(left, rising), MovingWall(right, falling))
     walls = Walls.around(SQUARE, space(), parts)
     x, y = np.asarray(walls.position).T
-    exact = np.where((x < 0.0)[:, None], 1.0, np.where((x > 1.0)[:, None], np.stack([-y, x], 1), 0))
-    np.testing.assert_array_equal(walls.velocity, exact)
+    exact = np.where(x < 0.0, 1.0 + y**2, np.where(x > 1.0, -x, 0.0))
+    np.testing.assert_array_equal(walls.velocity, np.stack([np.zeros_like(exact), exact], axis=1))
 
 
 # ------------------------------------------------------------------ round vessels
