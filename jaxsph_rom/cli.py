@@ -127,6 +127,8 @@ def _run(options) -> int:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
         write_study(study, experiments, outcomes, folder, report)
     print(format_table([outcome.case for outcome in outcomes]))
+    if plan.judged_from:
+        print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
     print(f"\nreport: {report}\nfigures: {folder}/*.png")
     return 0
 

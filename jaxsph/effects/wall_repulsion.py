@@ -19,9 +19,8 @@ class WallRepulsion(Effect):
     d_i is the particle's distance to the wall, n_i the wall's normal, a = 0.15 dx, A = 0.2.
     Pressure alone keeps particles half a spacing away from flat walls; where a flow turns sharply
     around an edge, some would cut the corner. The force has a potential, so it holds every particle
-    whose speed towards the wall is below c0 (2 A a / (3 dx))^(1/2), 0.14 c0. (A longer reach was
-    seen to disturb the density beside a lid.) Short-range boundary forces go back to Monaghan
-    (1994).
+    whose speed towards the wall is below c0 (2 A a / (3 dx))^(1/2), 0.14 c0. Short-range boundary
+    forces go back to Monaghan (1994).
 
     Args:
         fluid_region: where fluid may be (static).

@@ -83,9 +83,7 @@ def enclosed_flow(
     Raises:
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
-    for word, value in (("viscosity", viscosity), ("mach", mach), ("t-end", end_time)):
-        if not value > 0.0:
-            raise ValueError(f"{word}: must be positive, got {value:g}.")
+    positive(viscosity=viscosity, mach=mach, **{"t-end": end_time})
     kernel = WendlandC2() if kernel is None else kernel
     arrangement = Lattice() if arrangement is None else arrangement
     dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)

@@ -16,7 +16,7 @@ from .scene import Scene
 
 REFERENCE_SPEED = 2.0  # m/s
 CAVITY_LENGTH = 0.2  # m
-BULK_SPEED = 0.43  # m/s, mean velocity along the channel once it has settled
+BULK_SPEED = 0.43  # m/s, estimated: mean velocity along the channel once it has settled
 SCALES = {
     "small": Scale(resolution=160, h_over_dx=2.0, time_step=2e-4, steps_per_snapshot=10),
     "half": Scale(resolution=200, h_over_dx=2.0, time_step=5e-5, steps_per_snapshot=25),
@@ -48,8 +48,9 @@ def open_cavity(
 
     Driven above the cavity by `KickAndHold`: about 98 m/s^2 for 0.01 s, then 0.1 m/s^2. rho0 =
     1 kg/m^3, U = 2 m/s, Ma = 0.1, no-slip walls. The paper gives no viscosity; it says that Re
-    "results" as about 2400 on the cavity's length. Here nu = U_b L / Re with L = 0.2 m and the bulk
-    speed U_b = 0.43 m/s that the settled flow was measured to have at Re = 2400.
+    "results" as about 2400 on the cavity's length. Here nu = U_b L / Re with L = 0.2 m and
+    U_b = 0.43 m/s, an estimate of the settled bulk speed from one coarse run; the Reynolds number
+    that results has yet to be measured.
 
     Args:
         resolution: particles per 0.4 m, a multiple of 4; overrides the scale's, time step scaled
