@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from jaxsph import ParticleState, Trajectory, simulate
@@ -53,7 +54,9 @@ def recorded_run(
         state, writer = restore(read_trajectory(path)), TrajectoryWriter.append_to(path)
     else:
         state = start(made)
-        writer = TrajectoryWriter.create(path, scene, overwrite=True)
+        coordinates = jax.eval_shape(made.observe, state).coordinates
+        modes = None if coordinates is None else coordinates.shape[0]
+        writer = TrajectoryWriter.create(path, scene, modes=modes, overwrite=True)
     with progress(label, scene.steps, done) as report, writer:
         part = simulate(
             made,
