@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import sys
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -24,14 +24,13 @@ from jaxsph.cli import (
 )
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
-from jaxsph.metrics import centre_line, vertical_slice
 from jaxsph.scenes import SCENES
 
 from .basis import Energy, Euclidean
 from .field_advection import ConsistentAdvection, PaperAdvection
 from .projection import AdjointPetrovGalerkin, Galerkin
 from .report import format_table
-from .study import PLANS, Experiment, LocalBases, Plan, Study, settled, write_study
+from .study import PLANS, Plan, Study, write_study
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
@@ -113,7 +112,7 @@ def _run(options) -> int:
     check_target(folder / "report.json")
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
-        experiments = _experiments(plan)
+        experiments = plan.experiments()
         study = _study(options, plan, folder)
         outcomes = []
         try:
@@ -166,13 +165,6 @@ def _plan(options) -> Plan:
     return dataclasses.replace(plan, **given)
 
 
-def _experiments(plan: Plan) -> tuple[Experiment, ...]:
-    """One experiment with a global basis, or one for each local basis."""
-    if plan.borders is None:
-        return (Experiment(plan.train, plan.predict, plan.modes),)
-    return LocalBases(plan.borders).experiments(plan.train, plan.predict, plan.modes)
-
-
 def _study(options, plan: Plan, folder: Path) -> Study:
     make = SCENES[options.scene]
     settings = {
@@ -186,39 +178,27 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         settings["end_time"] = options.t_end
     for reynolds in (*plan.train, *plan.predict):  # meets bad input before the packing
         cheap = make(reynolds=reynolds, arrangement=ARRANGEMENTS["lattice"](seed=0), **settings)
-        _probes(plan)(cheap)
+        plan.probes(cheap)
     if options.arrangement is not None or options.seed is not None:
         rule = ARRANGEMENTS[options.arrangement or "packed"]
         settings["arrangement"] = rule(seed=options.seed or 0)
 
-    def scene(reynolds, **more):
-        return make(reynolds=reynolds, **{**settings, **more})
-
-    if plan.settling is not None:
-        if "start_time" not in inspect.signature(make).parameters:
-            raise ValueError(f"--settling: scene {options.scene} starts from rest; leave it out.")
-        scene = settled(scene, plan.settling, folder / "settling", _bar)
+    scene = plan.scenes(partial(make, **settings), folder, _bar)
     projections = {
         "galerkin": Galerkin(),
         "apg": AdjointPetrovGalerkin(jax.numpy.asarray(plan.tau, options.precision)),
     }
     return Study(
-        scene,
+        lambda reynolds: scene(reynolds=reynolds),
         folder,
         projections=tuple(projections[name] for name in dict.fromkeys(options.projection)),
         product=PRODUCTS[options.inner_product](),
         advection=ADVECTIONS[options.advection](),
         spline_order=options.spline_order,
         progress=_bar,
-        probes=_probes(plan),
+        probes=plan.probes,
         judged_from=plan.judged_from,
     )
-
-
-def _probes(plan: Plan):
-    if plan.slice_at is None:
-        return lambda scene: centre_line(scene.space)
-    return lambda scene: vertical_slice(scene.space, plan.slice_at)
 
 
 @contextmanager

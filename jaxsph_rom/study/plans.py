@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from jaxsph.metrics import centre_line, vertical_slice
+from jaxsph.scenes import Scene
+
+from .local_bases import LocalBases
+from .recorded_run import Progress
+from .settled import settled
+from .study import Experiment
 
 
 @dataclass(frozen=True)
@@ -27,6 +40,45 @@ class Plan:
     slice_at: float | None = None
     judged_from: float = 0.0
     settling: float | None = None
+
+    def experiments(self) -> tuple[Experiment, ...]:
+        """One experiment with a global basis, or one for each local basis.
+
+        Raises:
+            ValueError: as `LocalBases`.
+        """
+        if self.borders is None:
+            return (Experiment(self.train, self.predict, self.modes),)
+        return LocalBases(self.borders).experiments(self.train, self.predict, self.modes)
+
+    def probes(self, scene: Scene) -> np.ndarray:
+        """Where runs are compared (P, n) [m].
+
+        Raises:
+            ValueError: if the line is outside the scene's box.
+        """
+        if self.slice_at is None:
+            return centre_line(scene.space)
+        return vertical_slice(scene.space, self.slice_at)
+
+    def scenes(
+        self, make: Callable[..., Scene], folder: Path, progress: Progress
+    ) -> Callable[[float], Scene]:
+        """`make` as a function of the Reynolds number, settled first where the plan says so.
+
+        Args:
+            make: a scene from a Reynolds number, and from `start_time` where runs settle first.
+            folder: where runs that settle are kept.
+            progress: opens a progress bar for these.
+
+        Raises:
+            ValueError: if runs are to settle but the scene always starts from rest.
+        """
+        if self.settling is None:
+            return make
+        if "start_time" not in inspect.signature(make).parameters:
+            raise ValueError("settling: this scene starts from rest; leave it out.")
+        return settled(make, self.settling, folder / "settling", progress)
 
 
 _DECAYING = Plan((100.0, 150.0, 200.0, 250.0), (125.0, 175.0, 225.0), (3,), 1e-4)

@@ -33,14 +33,14 @@ def settled(
     """
 
     def scene(reynolds: float) -> Scene:
-        rest = make(reynolds, start_time=0.0, end_time=settling)
+        rest = make(reynolds=reynolds, start_time=0.0, end_time=settling)
         each = math.ceil(rest.steps / _SNAPSHOTS)
         step = settling / (each * _SNAPSHOTS)
-        rest = make(reynolds, start_time=0.0, end_time=settling, time_step=step)
+        rest = make(reynolds=reynolds, start_time=0.0, end_time=settling, time_step=step)
         rest = dataclasses.replace(rest, steps_per_snapshot=each)
         before = full_run(folder, rest, progress)
         fields = (before.position, before.velocity, before.density)
         state = ParticleState(*(jnp.asarray(field[-1]) for field in fields))
-        return dataclasses.replace(make(reynolds, start_time=settling), state=state)
+        return dataclasses.replace(make(reynolds=reynolds, start_time=settling), state=state)
 
     return scene

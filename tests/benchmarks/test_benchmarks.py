@@ -7,10 +7,12 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, right_hand_side, taylor_green_rom
+from benchmarks import convergence, paper_rom, right_hand_side
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
+from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.scenes import taylor_green
+from jaxsph_rom.study import PLANS
 
 
 @pytest.fixture(autouse=True)
@@ -68,47 +70,68 @@ def test_convergence_is_taken_up_again(tmp_path, capsys):
 
 def test_reduced_models_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "rom.json"
-    same = ["--resolution", "12", "--end-time", "0.1", "--arrangement", "lattice"]
-    same += ["--only", "reconstructive", "--projection", "galerkin", "--json", str(path)]
-    assert taylor_green_rom.main([*same, "--modes", "2"]) == 0
+    same = ["taylor-green", "--resolution", "12", "--end-time", "0.1", "--arrangement", "lattice"]
+    same += ["--cases", "reconstructive-*-galerkin", "--json", str(path)]
+    assert paper_rom.main([*same, "--modes", "2"]) == 0
     read = results(path)
     (case,) = read["cases"]
     assert case["kind"] == "reconstructive" and case["trained_on"] == [100.0]
     assert case["paper_velocity_peak_percent"] is None  # nothing is printed for M = 2
     assert case["velocity_peak_percent"] > 0 and case["rom_seconds"] > 0
+    assert case["velocity_peak_percent_from_start"] == case["velocity_peak_percent"]
     energy = read["cumulative_energy_percent"]["euclidean"]
     assert 0 < energy["reference"]["2"] <= 100 and energy["paper"]["lagrangian"]["2"] == 99.9
     assert (read["particles"], read["dtype"]) == (144, "float64")
     capsys.readouterr()
-    assert taylor_green_rom.main([*same, "--modes", "2"]) == 0
+    assert paper_rom.main([*same, "--modes", "2"]) == 0
     captured = capsys.readouterr()
     assert "done before: reconstructive-100-2-galerkin" in captured.err
     assert "cumulative energy" in captured.out
     assert results(path)["cases"] == [case]
-    assert taylor_green_rom.main([*same, "--end-time", "0.2"]) == 2
+    assert paper_rom.main([*same, "--end-time", "0.2"]) == 2
     assert "other settings" in capsys.readouterr().err
 
 
-def test_cases_of_the_paper():
-    options = taylor_green_rom._parser().parse_args(["--scale", "paper"])
-    wanted = taylor_green_rom._wanted(options)
-    names = {(c.kind, c.reynolds, c.modes, c.projection) for c in wanted}
-    assert names == taylor_green_rom.PAPER.keys() and len(wanted) == 10
-    options = taylor_green_rom._parser().parse_args(["--scale", "half", "--cases", "pred*"])
-    assert {c.reynolds for c in taylor_green_rom._wanted(options)} == {175.0}
+def test_reduced_open_cavity_settles_first(tmp_path):
+    path, out = tmp_path / "rom.json", tmp_path / "out"
+    same = ["open-cavity", "--resolution", "32", "--end-time", "0.02", "--settling", "0.02"]
+    same += ["--modes", "2", "--cases", "*-galerkin", "--out", str(out), "--json", str(path)]
+    assert paper_rom.main(same) == 0
+    read = results(path)
+    (case,) = read["cases"]
+    assert case["scene"] == "open-cavity" and case["reynolds"] == 2400.0
+    assert read["settings"]["settling"] == 0.02 and read["parameters"]["start_time"] == 0.02
+    assert (out / "settling" / "re-2400" / "trajectory.h5").exists()
+
+
+@pytest.mark.parametrize("scene", source_paper.EXPERIMENTS)
+def test_cases_of_the_paper(scene):
+    paper = source_paper.EXPERIMENTS[scene]
+    wanted = paper.wanted(paper.kinds)
+    assert {(c.kind, c.reynolds, c.modes, c.projection) for c in wanted} == paper.printed.keys()
+    for kind in paper.kinds.values():
+        assert kind.borders == (PLANS[scene].borders if kind.reynolds[1:] else None)
+
+
+def test_cases_at_a_scale():
+    arguments = ["taylor-green", "--scale", "half", "--cases", "pred*"]
+    options = paper_rom._parser().parse_args(arguments)
+    kinds = paper_rom._kinds(source_paper.EXPERIMENTS["taylor-green"], options)
+    every = source_paper.EXPERIMENTS["taylor-green"].wanted(kinds)
+    assert {c.reynolds for c in paper_rom._wanted(every, options)} == {175.0}
 
 
 def test_missing_cases_are_run_once_each():
     every = [
-        taylor_green_rom.Wanted("predictive", *values)
+        source_paper.Wanted("predictive", *values)
         for values in itertools.product((125.0, 175.0), (5, 10), ("galerkin", "apg"))
     ]
-    assert len(list(taylor_green_rom._products(every))) == 1
+    assert len(list(paper_rom._products(every))) == 1
     for count in range(len(every)):
         left = every[count:]
         runs = [
             (reynolds, modes, projection)
-            for group in taylor_green_rom._products(left)
+            for group in paper_rom._products(left)
             for reynolds, modes, projection in itertools.product(*group)
         ]
         assert sorted(runs) == sorted((c.reynolds, c.modes, c.projection) for c in left)
