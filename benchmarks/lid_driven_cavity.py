@@ -27,7 +27,7 @@ from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene, lid_driven_cavity
 from jaxsph_rom.study import full_run
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, near_walls, number, progress, read_json, tell, write_json
 from .references import ghia
 from .references.lid_driven_cavity import constant_lid, regularised_lid, solve
 
@@ -48,7 +48,6 @@ SETS = {
         for reynolds in (100, 400)
     ),
 }
-_STUCK = 5.0  # s, in which the lid slides by five times the cavity's length
 KEY = ("lid", "reynolds", "resolution", "end_time")
 
 
@@ -120,7 +119,7 @@ def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
     trajectory = full_run(folder, scene, progress)
     metadata = trajectory.metadata
     return {
-        **_walls(scene, trajectory),
+        **near_walls(scene, trajectory),
         **_errors(case, scene, trajectory),
         "fault": None,
         # of a run taken up again, extrapolated from its last part
@@ -133,32 +132,6 @@ def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
         "ghosts": scene.walls.position.shape[0],
         "device": jax.devices()[0].device_kind,
         "environment": environment(),
-    }
-
-
-def _walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
-    """Distances to walls and densities over all snapshots.
-
-    A particle counts as stuck if it stays nearer than 0.25 dx to a wall for `_STUCK` seconds. (That
-    none is beyond a wall is checked after every step of the run.)
-    """
-    region, dx = scene.walls.fluid_region, scene.space.spacing
-    distance = jax.jit(lambda x: -region.signed_distance(x) / dx)
-    over_dx = np.stack([np.asarray(distance(jnp.asarray(x))) for x in trajectory.position])
-    near = over_dx < 0.25
-    longest, lasting = np.zeros(near.shape[1], int), np.zeros(near.shape[1], int)
-    for row in near:
-        lasting = np.where(row, lasting + 1, 0)
-        longest = np.maximum(longest, lasting)
-    every = float(trajectory.time[1] - trajectory.time[0])
-    ratio = trajectory.density / float(scene.fluid.reference_density)
-    return {
-        "nearest_to_wall_over_dx": float(over_dx.min()),
-        "beyond_wall": int((over_dx < 0.0).sum()),
-        "longest_stay_within_quarter_dx": float(longest.max() * every),
-        "stuck": int((longest * every >= _STUCK).sum()),
-        "density_low": float(ratio.min()),
-        "density_high": float(ratio.max()),
     }
 
 

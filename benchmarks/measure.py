@@ -13,14 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from scipy.spatial import cKDTree
 from tqdm import tqdm
 
+from jaxsph import Trajectory
 from jaxsph.pairs import Space
+from jaxsph.scenes import Scene
 from jaxsph_rom.report.plain import plain
 
 _GIB = 2.0**30
+_STUCK = 5.0  # s
 
 
 def summary(seconds: list[float]) -> dict[str, float | int | None]:
@@ -70,6 +74,32 @@ def interacting_pairs(position, space: Space) -> int:
     position = np.where(periodic, position % lengths, position)
     tree = cKDTree(position, boxsize=np.where(periodic, lengths, 0.0))
     return int(tree.count_neighbors(tree, space.support)) - len(position)
+
+
+def near_walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Distances to walls and densities over all snapshots.
+
+    A particle counts as stuck if it stays nearer than 0.25 dx to a wall for `_STUCK` seconds. (That
+    none is beyond a wall is checked after every step of the run.)
+    """
+    region, dx = scene.walls.fluid_region, scene.space.spacing
+    distance = jax.jit(lambda x: -region.signed_distance(x) / dx)
+    over_dx = np.stack([np.asarray(distance(jnp.asarray(x))) for x in trajectory.position])
+    near = over_dx < 0.25
+    longest, lasting = np.zeros(near.shape[1], int), np.zeros(near.shape[1], int)
+    for row in near:
+        lasting = np.where(row, lasting + 1, 0)
+        longest = np.maximum(longest, lasting)
+    every = float(trajectory.time[1] - trajectory.time[0])
+    ratio = trajectory.density / float(scene.fluid.reference_density)
+    return {
+        "nearest_to_wall_over_dx": float(over_dx.min()),
+        "beyond_wall": int((over_dx < 0.0).sum()),
+        "longest_stay_within_quarter_dx": float(longest.max() * every),
+        "stuck": int((longest * every >= _STUCK).sum()),
+        "density_low": float(ratio.min()),
+        "density_high": float(ratio.max()),
+    }
 
 
 def peak_memory_gib() -> float:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import lid_driven_cavity, plane_flows, viscous_sum, wall_cost
+from benchmarks import lid_driven_cavity, open_cavity, plane_flows, viscous_sum, wall_cost
 
 
 @pytest.fixture(autouse=True)
@@ -76,3 +76,30 @@ def test_cases_of_the_cavity_have_whole_intervals():
                 every = scene.time_step * scene.steps_per_snapshot
                 assert scene.steps * scene.time_step == pytest.approx(20.0), name
                 assert every == pytest.approx(0.2)
+
+
+def test_open_cavity(tmp_path, capsys):
+    path = tmp_path / "open.json"
+    arguments = ["--resolution", "24", "--end-time", "0.2", "--json", str(path)]
+    assert open_cavity.main(arguments) == 0
+    read = json.loads(path.read_text())
+    assert 0.1 < read["bulk_velocity"] < 1.0  # the kick's impulse is 0.5 m/s over the channel
+    ratio = read["measured_reynolds"] / read["nominal_reynolds"]
+    assert ratio == pytest.approx(read["bulk_velocity"] / 0.43)
+    assert read["beyond_wall"] == 0 and len(read["time"]) == len(read["mouth_velocity_over_time"])
+    assert read["energy_change_in_last_second_percent"] is None  # there is no second before
+    assert "Reynolds number" in capsys.readouterr().out
+
+
+def test_frequency_and_settling_of_a_known_signal():
+    time = np.linspace(0.0, 10.0, 501)
+    signal = 0.3 - 0.01 * time + 0.2 * np.sin(2 * np.pi * 1.37 * time)
+    assert open_cavity.dominant_frequency(time, signal) == pytest.approx(1.37, abs=0.01)
+    slow = np.sin(2 * np.pi * 0.1 * time)  # one period: not to be told from a trend
+    assert open_cavity.dominant_frequency(time, slow) is None
+    # exp(-t) + 1: over a period P the mean changes by exp(-t) (1 - exp(-P))^2 / P
+    energy, period = np.exp(-time) + 1.0, 0.5
+    found = open_cavity.settling_time(time, energy, 1.0 / period, 0.01)
+    assert found == pytest.approx(-np.log(0.01 * period / (1.0 - np.exp(-period)) ** 2), abs=0.1)
+    assert open_cavity.settling_time(time, energy, None, 0.01) is None
+    assert open_cavity.settling_time(time, np.exp(time), 1.0 / period, 0.01) is None
