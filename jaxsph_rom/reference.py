@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Space, Trajectory
-from jaxsph.interpolation import ShepardMap
+from jaxsph.interpolation import KernelMap, ShepardMap
 
 
 def lagrangian_snapshots(trajectory: Trajectory) -> Float[np.ndarray, "particles fields times"]:
@@ -18,25 +18,32 @@ def lagrangian_snapshots(trajectory: Trajectory) -> Float[np.ndarray, "particles
 
 
 class ReferenceSpace(eqx.Module):
-    """Reference points x_G with the Shepard composition operator G (paper, section 3.1).
+    """Reference points x_G with the composition operator G (paper, section 3.1).
 
     Args:
         points: (G, n) [m]; the initial or any relaxed configuration of particles.
         space: box, kernel, smoothing length of the full model.
+        rule: of G: `ShepardMap` (the paper's), or `MovingLeastSquaresMap`, which keeps linear
+            fields.
     """
 
     points: Float[Array, "points dim"]
     space: Space = eqx.field(static=True)
-    shepard: ShepardMap
+    map: KernelMap
 
-    def __init__(self, points: Float[Array, "points dim"], space: Space):
+    def __init__(
+        self,
+        points: Float[Array, "points dim"],
+        space: Space,
+        rule: type[KernelMap] = ShepardMap,
+    ):
         self.points = jnp.asarray(points)
         self.space = space
-        self.shepard = ShepardMap.allocate(self.points, space)
+        self.map = rule.allocate(self.points, space)
 
     def compose(self, position: Array, fields: Array) -> tuple[Array, Array]:
         """G: particle fields (N, F) at the reference points (G, F), and the overflow flag."""
-        return self.shepard(position, fields)
+        return self.map(position, fields)
 
     def snapshots(self, trajectory: Trajectory) -> Float[np.ndarray, "points fields times"]:
         """(rho, u) of all snapshots on the reference points, density first.

@@ -1,0 +1,86 @@
+"""Moving least squares: what it keeps, its order, walls, and what it refuses."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxsph import Box, Space
+from jaxsph.arrangements import JitteredLattice, Lattice
+from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
+from jaxsph.kernels import WendlandC2
+
+
+def make_space(side, dim=2, periodic=True):
+    box = Box((0.0,) * dim, (1.0,) * dim, (periodic,) * dim)
+    return Space(box, WendlandC2(), 2.0 / side, 1.0 / side)
+
+
+def mapped(rule, points, space, x, values):
+    found, overflow = jax.jit(rule.allocate(points, space).__call__)(x, values)
+    assert not overflow
+    return np.asarray(found)
+
+
+@pytest.mark.parametrize("dim, side", [(2, 20), (3, 12)])
+def test_least_squares_equal_a_dense_solution(dim, side):
+    space = make_space(side, dim)
+    x = JitteredLattice(amplitude=0.3, seed=1).positions(space)
+    points = JitteredLattice(amplitude=0.3, seed=2).positions(space)
+    values = np.random.default_rng(0).normal(size=(len(x), 2))
+    found = mapped(MovingLeastSquaresMap, points, space, x, jnp.asarray(values))
+    for k in (0, len(x) // 2, len(x) - 1):
+        apart = np.asarray(x) - np.asarray(points)[k]
+        apart -= np.round(apart)
+        distance = jnp.linalg.norm(apart, axis=1)
+        weight = np.sqrt(np.asarray(space.kernel.value(distance, space.smoothing_length, dim)))
+        basis = np.concatenate([np.ones((len(x), 1)), apart / space.support], axis=1)
+        fit = np.linalg.lstsq(basis * weight[:, None], values * weight[:, None], rcond=None)[0]
+        np.testing.assert_allclose(found[k], fit[0], rtol=0, atol=1e-10)
+
+
+def test_linear_fields_are_kept_next_to_walls_where_shepard_is_one_sided():
+    space = make_space(16, periodic=False)
+    x = JitteredLattice(amplitude=0.3, seed=1).positions(space)
+    points = Lattice().positions(space)
+    linear = 3.0 + 2.0 * x[:, :1] - x[:, 1:]
+    exact = 3.0 + 2.0 * np.asarray(points)[:, :1] - np.asarray(points)[:, 1:]
+    found = mapped(MovingLeastSquaresMap, points, space, x, linear)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
+    one_sided = mapped(ShepardMap, points, space, x, linear)
+    edge = np.abs(np.asarray(points)[:, 0] - 0.5) > 0.5 - space.spacing
+    assert np.abs(one_sided - exact)[edge].max() > 0.05
+
+
+def test_waves_on_a_lattice_are_mapped_at_second_order_as_shepards():
+    # to first order both smooth a wave by the kernel's second moment
+    space = make_space(32)
+    x = Lattice().positions(space)
+    wave = jnp.sin(2.0 * jnp.pi * x[:, :1])
+    ours, shepard = (
+        mapped(rule, x, space, x, wave) for rule in (MovingLeastSquaresMap, ShepardMap)
+    )
+    np.testing.assert_allclose(ours, shepard, rtol=0, atol=1e-12)
+
+
+def test_a_point_with_too_few_particles_gets_shepards_value():
+    space = make_space(16, periodic=False)
+    x = jnp.asarray([[0.5, 0.5], [0.5, 0.5 + 1e-5]])  # no spread to fit a slope to
+    found = mapped(
+        MovingLeastSquaresMap, jnp.asarray([[0.55, 0.5]]), space, x, jnp.asarray([[1.0], [1.0]])
+    )
+    np.testing.assert_allclose(found, [[1.0]], rtol=1e-12)
+
+
+def test_gradients_in_values_and_places_are_finite():
+    space = make_space(16, periodic=False)
+    x = JitteredLattice(seed=1).positions(space)
+    rule = MovingLeastSquaresMap.allocate(Lattice().positions(space), space)
+    slope = jax.grad(lambda x, v: (rule(x, v)[0] ** 2).sum(), argnums=(0, 1))(x, x[:, :1])
+    assert all(bool(jnp.isfinite(s).all()) for s in slope)
+
+
+def test_a_narrow_periodic_box_is_refused():
+    space = make_space(9)
+    with pytest.raises(ValueError, match="three kernel supports"):
+        MovingLeastSquaresMap.allocate(Lattice().positions(space), space)
