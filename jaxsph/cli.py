@@ -17,7 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from . import __version__
-from .arrangements import Arrangement, JitteredLattice, Lattice, Packed
+from .arrangements import Arrangement, JitteredLattice, Lattice, Packed, Stirred
 from .environment import environment
 from .integrate import SimulationError
 from .io import (
@@ -35,7 +35,12 @@ from .scenes.record import scene_from_record
 from .simulate import simulate
 from .trajectory import Trajectory
 
-ARRANGEMENTS = {"packed": Packed, "lattice": lambda seed: Lattice(), "jittered": JitteredLattice}
+ARRANGEMENTS = {
+    "packed": Packed,
+    "lattice": lambda seed: Lattice(),
+    "jittered": JitteredLattice,
+    "stirred": Stirred,
+}
 SCALES = ("small", "half", "paper")
 # options that say what is run, and the scene's name for each; a resumed run has them from its file
 _SCENE_OPTIONS = {

@@ -47,6 +47,22 @@ class SPHFunctional(eqx.Module):
             state: the particles.
             neighbors: a `WallList` where there are walls, else a `VerletList`.
         """
+        context, fields, sums = self.sums(time, state, neighbors)
+        rates = {
+            "position": fields["velocity"],
+            "velocity": jnp.zeros_like(fields["velocity"]),
+            "density": jnp.zeros_like(fields["density"]),
+        }
+        for effect in self.effects:
+            with jax.named_scope(effect.name):
+                for name, rate in effect.rates(context, fields, sums).items():
+                    rates[name] = rates[name] + rate
+        return jax.tree.map(neighbors.unsort, ParticleState(**rates))
+
+    def sums(
+        self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
+    ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
+        """Context, fields and the sums of the second pass, in the list's sorted order."""
         state = jax.tree.map(neighbors.sort, state)
         context = Context(time, self.fluid, self.mass, self.space)
         fields = {
@@ -63,17 +79,7 @@ class SPHFunctional(eqx.Module):
             with jax.named_scope(effect.name):
                 fields = fields | effect.fields(context, fields, sums)
         with jax.named_scope("rate_pass"):
-            sums = self._sums("rate_terms", fields, ghosts, neighbors)
-        rates = {
-            "position": state.velocity,
-            "velocity": jnp.zeros_like(state.velocity),
-            "density": jnp.zeros_like(state.density),
-        }
-        for effect in self.effects:
-            with jax.named_scope(effect.name):
-                for name, rate in effect.rates(context, fields, sums).items():
-                    rates[name] = rates[name] + rate
-        return jax.tree.map(neighbors.unsort, ParticleState(**rates))
+            return context, fields, self._sums("rate_terms", fields, ghosts, neighbors)
 
     def _sums(self, kind: str, fields, ghosts, neighbors) -> dict[str, Array]:
         """The effects' sums of one pass, over particles and over ghosts."""

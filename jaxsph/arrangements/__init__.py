@@ -1,6 +1,7 @@
-"""Where particles start: on a lattice, on a jittered lattice, or packed."""
+"""Where particles start: on a lattice, on a jittered lattice, packed, or stirred."""
 
 from .base import Arrangement as Arrangement
 from .jittered_lattice import JitteredLattice as JitteredLattice
 from .lattice import Lattice as Lattice
 from .packed import Packed as Packed
+from .stirred import Stirred as Stirred

@@ -20,6 +20,21 @@ class ShiftingSum:
         return pair.gradient * (weight * weight)
 
 
+def shifting_term(space) -> PairTerm:
+    """The sum that the shift velocity follows."""
+    return PairTerm("shifting_sum", (), _weight(space))
+
+
+def shift_velocity(total, space, speed):
+    """du [m/s] from the sums (N, n) and the reference speed U = c0 Ma [m/s]."""
+    raw = -2.0 * space.smoothing_length * speed * total
+    squared = jnp.sum(raw * raw, axis=1)
+    limit = 0.5 * speed
+    fast = squared > limit**2
+    scale = jnp.where(fast, limit / jnp.sqrt(jnp.where(fast, squared, 1.0)), 1.0)
+    return scale[:, None] * raw
+
+
 class ParticleShifting(Effect):
     """dx_i/dt = u_i + du_i, with the shift velocity du_i (paper, eq. for particle shifting):
 
@@ -31,19 +46,14 @@ class ParticleShifting(Effect):
     """
 
     def geometry_terms(self, space):
-        return (PairTerm("shifting_sum", (), _weight(space)),)
+        return (shifting_term(space),)
 
     def wall_geometry_terms(self, space):
         return (WallTerm("shifting_sum", (), (), _weight(space)),)
 
     def fields(self, context, fields, sums):
-        speed = context.fluid.reference_speed  # c0 Ma
-        raw = -2.0 * context.space.smoothing_length * speed * sums["shifting_sum"]
-        squared = jnp.sum(raw * raw, axis=1)
-        limit = 0.5 * speed
-        fast = squared > limit**2
-        scale = jnp.where(fast, limit / jnp.sqrt(jnp.where(fast, squared, 1.0)), 1.0)
-        return {"shift_velocity": scale[:, None] * raw}
+        speed = context.fluid.reference_speed
+        return {"shift_velocity": shift_velocity(sums["shifting_sum"], context.space, speed)}
 
     def rates(self, context, fields, sums):
         return {"position": fields["shift_velocity"]}

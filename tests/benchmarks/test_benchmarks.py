@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, paper_rom, right_hand_side
+from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
 from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
@@ -155,3 +155,24 @@ def test_files(tmp_path):
     with pytest.raises(ValueError, match="not JSON"):
         read_json(path)
     assert 0.01 < peak_memory_gib() < 1000
+
+
+def test_tensor_models_are_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "tensor.json"
+    same = ["--resolution", "24", "--end-time", "0.05", "--modes", "2", "--iterations", "20"]
+    same += ["--predict", "175", "--json", str(path)]
+    assert tensor_rom.main(same) == 0
+    read = results(path)
+    plain, closed = read["rows"]
+    assert (plain["closure"], closed["closure"]) == ("none", "linear")
+    for row in read["rows"]:
+        assert row["stable"] and 0 < row["velocity_median_percent"] < 10
+        assert row["velocity_peak_percent"] >= 0.5 * row["floor_velocity_peak_percent"]
+        assert 0 < row["rom_seconds"]["median"] < row["fom_seconds"]
+    assert read["parameters"]["arrangement"]["rule"] == "Stirred"
+    assert read["parameters"]["start"] == "balanced"
+    capsys.readouterr()
+    assert tensor_rom.main(same) == 0
+    assert results(path)["rows"] == read["rows"]
+    assert tensor_rom.main([*same, "--iterations", "30"]) == 2
+    assert "other settings" in capsys.readouterr().err

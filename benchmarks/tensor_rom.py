@@ -1,0 +1,232 @@
+"""Reduced models on reference points: error beside online time and offline cost.
+
+    python -m benchmarks.tensor_rom --scale small
+
+The Taylor-Green vortex from stirred particles and a balanced start: trained at Re 100, 150, 200 and
+250, run at Reynolds numbers in between, with and without a linear closure. The closure learns from
+Re 100, 150 and 250; Re 200 is held back and decides which of its iterations is kept. Runs are kept
+in a folder and finished rows in the JSON file: the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time as clock
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import SimulationError, Trajectory
+from jaxsph.arrangements import Lattice, Stirred
+from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.environment import environment
+from jaxsph.io import check_target
+from jaxsph.metrics import centre_line, probe, relative_discrepancy
+from jaxsph.scenes import Scene, balanced, taylor_green
+from jaxsph_rom.hyper import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
+from jaxsph_rom.study import full_run
+from jaxsph_rom.study.recorded_run import with_record
+
+from .measure import format_rows, number, progress, read_json, summary, tell, write_json
+
+TRAINED_ON = (100.0, 150.0, 200.0, 250.0)
+HELD_BACK = 200.0
+PREDICTED = (110.0, 125.0, 175.0, 225.0, 240.0)  # 110 and 240: no choice was made by them
+KEY = ("reynolds", "modes", "closure")
+_REPEATS = 5
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: a full run failed, 2: bad input."""
+    return report_errors("tensor_rom", _command, argv)
+
+
+def _command(argv) -> int:
+    options = _parser().parse_args(argv)
+    path = options.json or Path("benchmarks", "results", f"tensor_rom_{options.scale}.json")
+    check_target(path)
+    with jax.enable_x64(True):
+        results = _started(path, options)
+        try:
+            _run(path, results, options)
+        except SimulationError as error:
+            return fail("tensor_rom", f"full model: {error}", 1)
+    print(_table(results))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.tensor_rom", description=__doc__.splitlines()[0]
+    )
+    add = parser.add_argument
+    add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
+    add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
+    add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
+    add("--predict", type=positive_float, nargs="+", default=list(PREDICTED), metavar="RE",
+        help="Reynolds numbers to run at (default: 110 125 175 225 240)")  # fmt: skip
+    add("--modes", type=positive_int, nargs="+", default=[5, 10, 20], metavar="M",
+        help="numbers of modes (default: 5 10 20)")  # fmt: skip
+    add("--iterations", type=positive_int, default=600, metavar="K",
+        help="of the closure's training (default: %(default)s)")  # fmt: skip
+    add("--out", type=Path, metavar="DIR",
+        help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
+    add("--json", type=Path, metavar="FILE",
+        help="default: benchmarks/results/tensor_rom_SCALE.json")  # fmt: skip
+    return parser
+
+
+def _started(path: Path, options) -> dict[str, Any]:
+    """The results so far.
+
+    Raises:
+        ValueError: if the file holds results of other settings.
+    """
+    settings = {
+        name: getattr(options, name) for name in ("scale", "resolution", "end_time", "iterations")
+    }
+    found = read_json(path) or {"settings": settings, "rows": [], "offline": []}
+    if found.get("settings") != settings:
+        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
+    return found
+
+
+def _run(path: Path, results: dict[str, Any], options) -> None:
+    done = {tuple(row[name] for name in KEY) for row in results["rows"]}
+    folder = options.out or Path("out", f"tensor-rom-{options.scale}")
+    scenes = {re: _scene(options, re) for re in {*TRAINED_ON, *options.predict}}
+    runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
+    scene = scenes[TRAINED_ON[0]]
+    points = Lattice().positions(scene.space)
+    tell("training")
+    start = clock.perf_counter()
+    training = [runs[re] for re in TRAINED_ON]
+    largest = ReducedFlow.train(scene, training, points, max(options.modes))
+    jax.block_until_ready(largest.system)
+    trained = clock.perf_counter() - start
+    mapped = {re: mapped_run(largest.reference, run, scene.fluid) for re, run in runs.items()}
+    results |= {
+        "particles": runs[TRAINED_ON[0]].particles,
+        "parameters": scene.parameters,
+        "trained_on": TRAINED_ON,
+        "held_back": HELD_BACK,
+        "device": jax.devices()[0].device_kind,
+        "environment": environment(),
+    }
+    truth = {re: _profile(scenes[re], run) for re, run in runs.items()}
+    for modes in options.modes:
+        flow = largest.truncated(modes)
+        projected = {re: np.asarray(flow.project(fields)) for re, fields in mapped.items()}
+        for closure in ("none", "linear"):
+            left = [re for re in options.predict if (re, modes, closure) not in done]
+            if not left:
+                continue
+            closed, offline = flow, {"modes": modes, "closure": closure, "training_s": trained}
+            if closure == "linear":
+                closed, offline["closure_s"] = _closed(flow, scene, projected, options.iterations)
+            results["offline"].append(offline)
+            for re in left:
+                row = {"reynolds": re, "modes": modes, "closure": closure}
+                row |= _judged(closed, scenes[re], runs[re], projected[re], truth[re])
+                results["rows"].append(row)
+                write_json(path, results)
+
+
+def _scene(options, reynolds: float) -> Scene:
+    scene = taylor_green(
+        options.resolution,
+        reynolds,
+        scale=options.scale,
+        end_time=options.end_time,
+        arrangement=Stirred(),
+        dtype="float64",
+    )
+    return with_record(balanced(scene), start="balanced")
+
+
+def _closed(flow: ReducedFlow, scene: Scene, projected, iterations: int):
+    """The flow with a closure, and the time that it took to learn."""
+    runs = {re: ProjectedRun(1.0 / re, projected[re]) for re in TRAINED_ON}
+    window = min(50, len(projected[HELD_BACK]) - 1)
+    start = clock.perf_counter()
+    with progress(f"closure, M = {flow.basis.size}", iterations) as report:
+        fitted = fit_linear_closure(
+            flow.system,
+            [run for re, run in runs.items() if re != HELD_BACK],
+            scene.time_step,
+            scene.steps_per_snapshot,
+            held_back=runs[HELD_BACK],
+            window=window,
+            iterations=iterations,
+            progress=report,
+        )
+    seconds = clock.perf_counter() - start
+    return ReducedFlow(flow.reference, flow.basis, fitted.system, flow.fluid), seconds
+
+
+def _profile(scene: Scene, run: Trajectory):
+    return probe(run, centre_line(scene.space), scene.space)
+
+
+def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -> dict[str, Any]:
+    """Errors on the centre line, the projection's own as a floor, and times."""
+    snapshots = len(run.time) - 1
+    arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)
+    first = jnp.asarray(projected[0])
+    seconds, fault, found = [], None, None
+    try:
+        for _ in range(1 + _REPEATS):
+            start = clock.perf_counter()
+            found = jax.block_until_ready(flow.predict(first, *arguments, snapshots))
+            seconds.append(clock.perf_counter() - start)
+    except SimulationError as error:
+        fault = str(error)
+    metadata = run.metadata
+    row = {
+        "stable": fault is None,
+        "fault": fault,
+        "rom_compile_and_first_seconds": seconds[0] if seconds else None,
+        "rom_seconds": summary(seconds[1:]),
+        "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
+        "steps": scene.steps,
+    }
+    row |= _percent("floor_", truth, _profile(scene, flow.fields(jnp.asarray(projected), run.time)))
+    if found is not None:
+        coordinates = jnp.concatenate([first[None], found])
+        row |= _percent("", truth, _profile(scene, flow.fields(coordinates, run.time)))
+    return row
+
+
+def _percent(prefix: str, truth, found) -> dict[str, float]:
+    row = {}
+    for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
+        percent = relative_discrepancy(a, b)
+        row[f"{prefix}{name}_peak_percent"] = float(percent.max())
+        row[f"{prefix}{name}_median_percent"] = float(np.median(percent))
+    return row
+
+
+def _table(results: dict[str, Any]) -> str:
+    header = ("Re", "M", "closure", "velocity %", "floor", "pressure %", "median", "floor",
+              "median", "full s", "reduced ms", "stable")  # fmt: skip
+    rows = []
+    for row in results["rows"]:
+        seconds = row["rom_seconds"]["median"]
+        rows.append((
+            f"{row['reynolds']:g}", str(row["modes"]), row["closure"],
+            *(number(row.get(name)) for name in (
+                "velocity_peak_percent", "floor_velocity_peak_percent", "pressure_peak_percent",
+                "pressure_median_percent", "floor_pressure_peak_percent",
+                "floor_pressure_median_percent", "fom_seconds")),
+            number(None if seconds is None else 1e3 * seconds), "yes" if row["stable"] else "no",
+        ))  # fmt: skip
+    return f"peak discrepancy on the centre line, {results['particles']} particles\n" + format_rows(
+        header, rows
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

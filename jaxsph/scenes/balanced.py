@@ -1,0 +1,77 @@
+"""A start without sound."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.scipy.sparse.linalg import cg
+from jaxtyping import Array
+
+from ..pairs import PairTerm, pair_sum
+from ..particles import ParticleState
+from .scene import Scene
+
+_SMOOTHINGS = 6  # by the kernel; with 2 the noise of disordered particles is balanced too
+
+
+def smoothing_sum(pair, i, j):
+    """f_j W_ij V_j"""
+    return j.value * pair.kernel * j.volume
+
+
+_SMOOTHING = (PairTerm("smoothing_sum", ("value",), smoothing_sum),)
+
+
+def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Scene:
+    """The scene with densities at the start whose pressure balances the flow:
+
+        S d^2 rho / dt^2 = 0    for rho = rho_given + S z, at the same mean density.
+
+    A pressure in closed form balances the flow of the continuum, not the sums over particles; the
+    difference sets out as sound. Here the second derivative is that of the scene's own functional
+    along its own rates (`jax.jvp`), an elliptic operator of the density; S smooths by the kernel,
+    as sums over disordered particles have a noise that is not to be balanced. Solved by conjugate
+    gradients.
+
+    Args:
+        scene: periodic; its positions and velocities stay, its densities are a first guess.
+        tolerance: of the residual, relative to that of the densities given.
+        iterations: at most.
+
+    Raises:
+        ValueError: if the scene has walls.
+    """
+    if scene.walls is not None:
+        raise ValueError("balanced: a scene with walls starts from rest; leave it as it is.")
+    neighbors = scene.search().build(scene.state.position)
+    density = _solved(scene.functional(), scene.state, neighbors, tolerance, iterations)
+    return eqx.tree_at(lambda s: s.state.density, scene, density)
+
+
+@eqx.filter_jit
+def _solved(functional, state, neighbors, tolerance: float, iterations: int) -> Array:
+    space, time = functional.space, jnp.zeros((), state.density.dtype)
+    volume = jnp.full_like(state.density, space.spacing**space.box.dim)
+    itself = space.kernel.value(time, space.smoothing_length, space.box.dim)
+
+    def smoothed(values: Array) -> Array:
+        for _ in range(_SMOOTHINGS):
+            fields = {"position": state.position, "volume": volume, "value": values}
+            fields = {name: neighbors.sort(field) for name, field in fields.items()}
+            sums = pair_sum(_SMOOTHING, fields, space, neighbors)["smoothing_sum"]
+            values = neighbors.unsort(sums) + itself * volume * values
+        return values - jnp.mean(values)
+
+    def second_derivative(density: Array) -> Array:
+        start = ParticleState(state.position, state.velocity, density)
+        rates = functional(time, start, neighbors)
+        return jax.jvp(lambda s: functional(time, s, neighbors).density, (start,), (rates,))[1]
+
+    residual, slope = jax.linearize(second_derivative, state.density)
+
+    def operator(change):  # minus a smoothed Laplacian times c0^2: positive
+        return -smoothed(slope(smoothed(change)))
+
+    change, _ = cg(operator, smoothed(residual), tol=tolerance, maxiter=iterations)
+    return state.density + smoothed(change)

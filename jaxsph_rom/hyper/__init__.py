@@ -1,0 +1,14 @@
+"""Hyper-reduction: reduced models whose cost does not depend on the number of particles."""
+
+from .closure import FittedClosure as FittedClosure
+from .closure import ProjectedRun as ProjectedRun
+from .closure import fit_linear_closure as fit_linear_closure
+from .closure import rollout as rollout
+from .log_density import from_log_density as from_log_density
+from .log_density import to_log_density as to_log_density
+from .quadratic_system import QuadraticSystem as QuadraticSystem
+from .quadratic_system import galerkin_system as galerkin_system
+from .reduced_flow import ReducedFlow as ReducedFlow
+from .reduced_flow import mapped_run as mapped_run
+from .reference_operators import ReferenceOperators as ReferenceOperators
+from .tensor_model import TensorModel as TensorModel

@@ -1,0 +1,129 @@
+"""The Galerkin system on reference points as constant tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float
+
+from jaxsph.scenes import Scene
+
+from ..basis import Basis
+from .reference_operators import ReferenceOperators, mapped
+
+
+class QuadraticSystem(eqx.Module):
+    """da/dt = C + nu C' + (L + nu L') a + Q(a, a), the Galerkin system with explicit viscosity.
+
+    One system serves every Reynolds number; its cost does not depend on the number of particles.
+
+    Args:
+        constant: (C, C'); from a centre that does not rest, forces and moving walls.
+        linear: (L, L').
+        quadratic: Q_kij, symmetric in i and j.
+    """
+
+    constant: Float[Array, "2 modes"]
+    linear: Float[Array, "2 modes modes"]
+    quadratic: Float[Array, "modes modes modes"]
+
+    @property
+    def size(self) -> int:
+        return self.constant.shape[1]
+
+    def __call__(
+        self, coordinates: Float[Array, " modes"], viscosity: Float[Array, ""]
+    ) -> Float[Array, " modes"]:
+        """da/dt."""
+        constant = self.constant[0] + viscosity * self.constant[1]
+        linear = self.linear[0] + viscosity * self.linear[1]
+        carried = jnp.einsum("kij,j->ki", self.quadratic, coordinates)
+        return constant + (linear + carried) @ coordinates
+
+    def truncated(self, modes: int) -> QuadraticSystem:
+        """The system of the first modes."""
+        return QuadraticSystem(
+            self.constant[:, :modes],
+            self.linear[:, :modes, :modes],
+            self.quadratic[:modes, :modes, :modes],
+        )
+
+
+def advective(carried: Float[Array, "carrier test carried"]) -> Array:
+    """u . grad w as it stands."""
+    return carried
+
+
+def skew_symmetric(carried: Float[Array, "carrier test carried"]) -> Array:
+    """u . grad w + (div u) w / 2, tested: the half of <v, u . grad w> - <w, u . grad v>.
+
+    It moves energy between modes and makes none, whatever the divergence left in the discrete u.
+    """
+    return 0.5 * (carried - jnp.swapaxes(carried, 1, 2))
+
+
+def galerkin_system(
+    scene: Scene,
+    basis: Basis,
+    points: Float[np.ndarray, "points dim"],
+    form: Callable[[Array], Array] = skew_symmetric,
+) -> QuadraticSystem:
+    """The Galerkin system of a scene on the reference points, in the basis' inner product.
+
+        da/dt = Phi^T W f(centre + Phi a)
+
+    Args:
+        scene: its effects and walls; the viscosity stays a parameter.
+        basis: modes of (r, u), r the logarithmic density, orthonormal in its product.
+        points: x_G, where the modes live (G, n) [m].
+        form: of advection by modes, `skew_symmetric` or `advective`.
+    """
+    operators = ReferenceOperators.of_scene(scene, points)
+    dtype = operators.points.dtype
+    modes = jnp.asarray(basis.modes, dtype)
+    centre = jnp.broadcast_to(jnp.asarray(basis.centre, dtype), modes.shape[:2])
+    weighted = modes * jnp.asarray(basis.weights, dtype)[None, :, None]
+    return _assembled(operators, modes, centre, weighted, form)
+
+
+@eqx.filter_jit
+def _assembled(operators, modes, centre, weighted, form) -> QuadraticSystem:
+    test = weighted.reshape(-1, weighted.shape[2]).T
+    flat = (-1, modes.shape[2])
+
+    def slopes(function, *arguments):
+        def along(mode):
+            return jax.jvp(lambda f: function(f, *arguments), (centre,), (mode,))[1]
+
+        return mapped(along, modes)
+
+    inviscid, viscous = (
+        (
+            test @ operators.affine(centre, nu).reshape(-1),
+            test @ slopes(operators.affine, nu).reshape(flat),
+        )
+        for nu in (jnp.zeros((), modes.dtype), jnp.ones((), modes.dtype))
+    )
+    gradient, of_centre = slopes(operators.gradients), operators.gradients(centre)
+    velocity, mean = modes[:, 1:], centre[:, 1:]
+
+    def carried(velocity, gradient):
+        return -jnp.einsum("gd,gfd...->gf...", velocity, gradient)
+
+    centre_by_centre = test @ carried(mean, of_centre).reshape(-1)
+    centre_by_modes = -jnp.einsum("gdm,gfd->gfm", velocity, of_centre)
+    with_centre = test @ (carried(mean, gradient) + centre_by_modes).reshape(flat)
+    by_modes = lax.map(
+        lambda one: test @ carried(one, gradient).reshape(flat), jnp.moveaxis(velocity, 2, 0)
+    )  # [i, k, j]: mode j carried by mode i
+    by_modes = form(by_modes)
+    return QuadraticSystem(
+        jnp.stack([inviscid[0] + centre_by_centre, viscous[0] - inviscid[0]]),
+        jnp.stack([inviscid[1] + with_centre, viscous[1] - inviscid[1]]),
+        0.5 * (jnp.transpose(by_modes, (1, 0, 2)) + jnp.transpose(by_modes, (1, 2, 0))),
+    )

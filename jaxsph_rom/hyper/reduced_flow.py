@@ -1,0 +1,138 @@
+"""A reduced model on reference points, from full runs to fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxsph import Fluid, Trajectory
+from jaxsph.integrate import SimulationError, integrate
+from jaxsph.interpolation import KernelMap, MovingLeastSquaresMap
+from jaxsph.scenes import Scene
+
+from ..basis import Basis, Energy, InnerProduct, pod
+from ..reference import ReferenceSpace
+from .log_density import from_log_density, to_log_density
+from .quadratic_system import QuadraticSystem, galerkin_system
+from .tensor_model import TensorModel
+
+
+class ReducedFlow(eqx.Module):
+    """Basis and quadratic system of a flow on reference points; it knows no particles.
+
+        flow = ReducedFlow.train(scene, runs, points, modes=10)
+        coordinates = flow.predict(flow.project(position, velocity, density), viscosity, ...)
+        fields = flow.fields(coordinates)
+
+    Args:
+        reference: reference points and the map to them.
+        basis: of (r, u), r the logarithmic density.
+        system: of its coordinates.
+        fluid: gives densities their scale.
+    """
+
+    reference: ReferenceSpace
+    basis: Basis
+    system: QuadraticSystem
+    fluid: Fluid
+
+    @classmethod
+    def train(
+        cls,
+        scene: Scene,
+        runs: Sequence[Trajectory],
+        points: Float[Array, "points dim"],
+        modes: int,
+        product: InnerProduct | None = None,
+        rule: type[KernelMap] = MovingLeastSquaresMap,
+    ) -> ReducedFlow:
+        """Map the runs, decompose them, and project the scene's equations.
+
+        Args:
+            scene: whose effects are projected; its viscosity stays a parameter.
+            runs: of the full model.
+            points: of the reference space.
+            modes: how many.
+            product: `Energy()` if none is given.
+            rule: of the map.
+
+        Raises:
+            ValueError: as `ReferenceSpace.snapshots` and `pod`.
+        """
+        reference = ReferenceSpace(points, scene.space, rule)
+        mapped = np.concatenate([mapped_run(reference, run, scene.fluid) for run in runs], axis=-1)
+        basis = pod(mapped, Energy() if product is None else product, scene.fluid, modes)
+        return cls(reference, basis, galerkin_system(scene, basis, points), scene.fluid)
+
+    def truncated(self, modes: int) -> ReducedFlow:
+        """The reduced model of the first modes; nothing is projected again.
+
+        Raises:
+            ValueError: if there are not so many.
+        """
+        basis, system = self.basis.truncated(modes), self.system.truncated(modes)
+        return eqx.tree_at(lambda f: (f.basis, f.system), self, (basis, system))
+
+    def project(self, fields: Float[Array, "points fields *times"]) -> Float[Array, "*times modes"]:
+        """Coordinates of (r, u) on the reference points, as `mapped_run` gives them."""
+        modes, weights = jnp.asarray(self.basis.modes), jnp.asarray(self.basis.weights)
+        centre = jnp.asarray(self.basis.centre)
+        weighted = modes * weights[None, :, None]
+        constant = jnp.einsum("gfm,f->m", weighted, centre)
+        found = jnp.einsum("gfm,gf...->...m", weighted, jnp.asarray(fields))
+        return found - constant.reshape((1,) * (found.ndim - 1) + (-1,))
+
+    def predict(
+        self,
+        coordinates: Float[Array, " modes"],
+        viscosity: Float[Array, ""],
+        time_step: float,
+        steps_per_snapshot: int,
+        snapshots: int,
+    ) -> Float[Array, "snapshots modes"]:
+        """Coordinates after each interval, by the full model's loop.
+
+        Raises:
+            SimulationError: if they grow beyond all bounds; it names the step.
+        """
+        model = TensorModel(self.system, jnp.asarray(viscosity, coordinates.dtype))
+        step = jnp.asarray(time_step, coordinates.dtype)
+        _, fault, found, _ = _integrated(model, coordinates, step, steps_per_snapshot, snapshots)
+        if int(fault.code) != 0:
+            raise SimulationError(fault, time_step)
+        return found
+
+    def fields(self, coordinates: Float[Array, "times modes"], time) -> Trajectory:
+        """Fields at the reference points at the times of the coordinates (S,)."""
+        centre = jnp.asarray(self.basis.centre)[None, None, :]
+        fields = centre + jnp.einsum("gfm,sm->sgf", jnp.asarray(self.basis.modes), coordinates)
+        density = from_log_density(fields[..., 0], self.fluid)
+        points = np.asarray(self.reference.points)
+        return Trajectory(
+            time=np.asarray(time),
+            position=np.broadcast_to(points, (len(time), *points.shape)),
+            velocity=np.asarray(fields[..., 1:]),
+            density=np.asarray(density),
+            pressure=np.asarray(self.fluid.pressure(density)),
+            coordinates=np.asarray(coordinates),
+        )
+
+
+@eqx.filter_jit
+def _integrated(model, coordinates, time_step, steps_per_snapshot, snapshots):
+    first = jnp.zeros((), jnp.int32)
+    return integrate(model, coordinates, first, time_step, steps_per_snapshot, snapshots)
+
+
+def mapped_run(
+    reference: ReferenceSpace, run: Trajectory, fluid: Fluid
+) -> Float[np.ndarray, "points fields times"]:
+    """(r, u) of a full run on the reference points, r the logarithmic density."""
+    snapshots = reference.snapshots(run)
+    log_density = jax.jit(to_log_density)(jnp.asarray(snapshots[:, 0]), fluid)
+    return np.concatenate([np.asarray(log_density)[:, None], snapshots[:, 1:]], axis=1)

@@ -1,0 +1,45 @@
+"""The reduced model on reference points, in the protocol of the time loop."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxsph.integrate import Fault, FaultCode, Model
+
+from .quadratic_system import QuadraticSystem
+
+
+class TensorModel(Model):
+    """da/dt of a `QuadraticSystem` at a viscosity; its state are the coordinates a (M,).
+
+    It runs in the full model's loop at a cost of M^3 a step, whatever the number of particles. What
+    is recorded are the coordinates; fields are made of these on demand.
+
+    Args:
+        system: constant, linear and quadratic part.
+        viscosity: nu [m^2/s], a leaf to sweep or to differentiate.
+    """
+
+    system: QuadraticSystem
+    viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def prepare(self, state):
+        return None
+
+    def refresh(self, auxiliary, state, time_step):
+        return auxiliary
+
+    def rates(self, time, state, auxiliary):
+        return self.system(state, self.viscosity)
+
+    def finish(self, state):
+        return state
+
+    def inspect(self, step, state, auxiliary):
+        lost = ~jnp.all(jnp.isfinite(state))
+        return Fault.first_of(step, (FaultCode.NOT_FINITE, lost, -1))
+
+    def observe(self, state):
+        return state
