@@ -193,10 +193,15 @@ def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) 
         "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
         "steps": scene.steps,
     }
-    row |= _percent("floor_", truth, _profile(scene, flow.fields(jnp.asarray(projected), run.time)))
+    line = centre_line(scene.space)
+
+    def profile(coordinates):
+        fields = flow.fields(coordinates, run.time, line)
+        return np.linalg.norm(fields.velocity, axis=2), fields.pressure
+
+    row |= _percent("floor_", truth, profile(jnp.asarray(projected)))
     if found is not None:
-        coordinates = jnp.concatenate([first[None], found])
-        row |= _percent("", truth, _profile(scene, flow.fields(coordinates, run.time)))
+        row |= _percent("", truth, profile(jnp.concatenate([first[None], found])))
     return row
 
 

@@ -8,6 +8,7 @@ from .body_force import Gravity as Gravity
 from .body_force import KickAndHold as KickAndHold
 from .continuity import Continuity as Continuity
 from .density_diffusion import DensityDiffusion as DensityDiffusion
+from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
 from .laminar_viscosity import LaminarViscosity as LaminarViscosity
 from .particle_shifting import ParticleShifting as ParticleShifting
 from .pressure_force import PressureForce as PressureForce

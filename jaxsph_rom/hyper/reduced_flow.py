@@ -17,6 +17,7 @@ from jaxsph.scenes import Scene
 
 from ..basis import Basis, Energy, InnerProduct, pod
 from ..reference import ReferenceSpace
+from ..splines import LocalSplines
 from .log_density import from_log_density, to_log_density
 from .quadratic_system import QuadraticSystem, galerkin_system
 from .tensor_model import TensorModel
@@ -107,12 +108,28 @@ class ReducedFlow(eqx.Module):
             raise SimulationError(fault, time_step)
         return found
 
-    def fields(self, coordinates: Float[Array, "times modes"], time) -> Trajectory:
-        """Fields at the reference points at the times of the coordinates (S,)."""
+    def fields(
+        self,
+        coordinates: Float[Array, "times modes"],
+        time: Float[np.ndarray, " times"],
+        points: Float[np.ndarray, "points dim"] | None = None,
+    ) -> Trajectory:
+        """Fields at the times of the coordinates, at the reference points or at others.
+
+        Other points get the modes by local splines, exact at the reference points: what was
+        smoothed once by the map is not smoothed again.
+
+        Raises:
+            ValueError: if the points crowd a cell of the splines.
+        """
+        modes = self.basis.modes
+        if points is None:
+            points = np.asarray(self.reference.points)
+        else:
+            modes = self._modes_at(points)
         centre = jnp.asarray(self.basis.centre)[None, None, :]
-        fields = centre + jnp.einsum("gfm,sm->sgf", jnp.asarray(self.basis.modes), coordinates)
+        fields = centre + jnp.einsum("gfm,sm->sgf", jnp.asarray(modes), coordinates)
         density = from_log_density(fields[..., 0], self.fluid)
-        points = np.asarray(self.reference.points)
         return Trajectory(
             time=np.asarray(time),
             position=np.broadcast_to(points, (len(time), *points.shape)),
@@ -121,6 +138,15 @@ class ReducedFlow(eqx.Module):
             pressure=np.asarray(self.fluid.pressure(density)),
             coordinates=np.asarray(coordinates),
         )
+
+    def _modes_at(self, points) -> Float[Array, "points fields modes"]:
+        shape, space = self.basis.modes.shape, self.reference.space
+        values = np.asarray(self.basis.modes).reshape(shape[0], -1)
+        splines = LocalSplines.fit(np.asarray(self.reference.points), values, space)
+        points = jnp.asarray(points, self.reference.points.dtype)
+        if bool(splines.overflow(points)):
+            raise ValueError("points: too many in one cell of the splines; ask for some at a time.")
+        return splines(points).reshape(-1, *shape[1:])
 
 
 @eqx.filter_jit

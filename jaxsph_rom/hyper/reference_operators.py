@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from jaxsph import PairTerm, ParticleState, SPHFunctional, VerletList, WallList
 from jaxsph.effects import (
     Effect,
+    IsotropicViscosity,
     LaminarViscosity,
     ParticleShifting,
     ShiftingTransport,
@@ -60,9 +61,10 @@ class ReferenceOperators(eqx.Module):
         dr/dt = -rho0 div u - u . grad r + D r,
         du/dt = -(c0^2 / rho0) grad r - u . grad u + nu V u + b,
 
-    they are quadratic without remainder. div, grad, the viscous sum V and the density diffusion D
-    are the full model's pair sums, walls included; at fixed points they are linear. Advection uses
-    gradients in difference form, sum_j (f_j - f_i) grad W V_0.
+    they are quadratic without remainder. div, grad and the density diffusion D are the full model's
+    pair sums, walls included; at fixed points they are linear. V is that of `IsotropicViscosity`:
+    on a lattice it is more accurate than the full model's, as that one is among moving particles.
+    Advection uses gradients in difference form, sum_j (f_j - f_i) grad W V_0.
 
     Args:
         functional: the scene's effects but for those that only keep particles evenly spread.
@@ -81,7 +83,11 @@ class ReferenceOperators(eqx.Module):
         Raises:
             ValueError: if the box is too small for the kernel's support.
         """
-        kept = tuple(e for e in scene.effects if not isinstance(e, _OF_PARTICLES))
+        kept = tuple(
+            IsotropicViscosity(e.viscosity) if isinstance(e, LaminarViscosity) else e
+            for e in scene.effects
+            if not isinstance(e, _OF_PARTICLES)
+        )
         functional = eqx.tree_at(
             lambda f: f.effects, scene.functional(), kept, is_leaf=lambda x: isinstance(x, tuple)
         )
@@ -97,7 +103,7 @@ class ReferenceOperators(eqx.Module):
             lambda f: f.effects,
             self.functional,
             tuple(
-                LaminarViscosity(viscosity) if isinstance(e, LaminarViscosity) else e
+                IsotropicViscosity(viscosity) if isinstance(e, IsotropicViscosity) else e
                 for e in self.functional.effects
             ),
             is_leaf=lambda x: isinstance(x, tuple),

@@ -8,7 +8,7 @@ import pytest
 
 from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
-from jaxsph.effects import LaminarViscosity
+from jaxsph.effects import IsotropicViscosity
 from jaxsph.integrate import integrate
 from jaxsph.scenes import couette, lid_driven_cavity, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
@@ -72,7 +72,7 @@ def test_operators_are_the_full_models_right_hand_side_about_rest(vortex):
     small = type(state)(state.position, fields[:, 1:], fields[:, 0])
     kept = operators.functional
     full = kept(jnp.zeros(()), small, operators.neighbors)
-    (viscosity,) = (e.viscosity for e in kept.effects if isinstance(e, LaminarViscosity))
+    (viscosity,) = (e.viscosity for e in kept.effects if isinstance(e, IsotropicViscosity))
     found = operators.affine(fields, viscosity)
     for mine, theirs in ((found[:, 0], full.density), (found[:, 1:], full.velocity)):
         scale = float(jnp.abs(theirs).max())
@@ -148,8 +148,7 @@ def test_a_vortex_decays_as_it_should_in_the_full_models_loop():
     assert int(fault.code) == 0 and bool(good.all()) and found.shape == (10, 2)
     energy = np.sum(np.asarray(found) ** 2, axis=1) / np.sum(start**2)
     wanted = np.exp(-16 * np.pi**2 * VISCOSITY * time[1:])
-    # the viscous sum at h = 2 dx is 4 percent too strong on a lattice
-    np.testing.assert_allclose(np.log(energy), 1.038 * np.log(wanted), rtol=0.02)
+    np.testing.assert_allclose(np.log(energy), np.log(wanted), rtol=0.025)  # the kernel smooths
 
 
 def test_a_run_is_mapped_into_log_density():

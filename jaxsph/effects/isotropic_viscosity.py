@@ -1,0 +1,38 @@
+"""Viscosity as a Laplacian of each velocity component."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..pairs import PairTerm
+from .base import Effect, WallTerm
+
+
+def laplacian_sum(pair, i, j):
+    """(u_j - u_i) (x_j - x_i) . grad_i W_ij / r^2 V_j"""
+    return (j.velocity - i.velocity) * pair.radial_slope
+
+
+class IsotropicViscosity(Effect):
+    """du_i/dt = rho0/rho_i 2 nu sum_j (u_j-u_i) (x_j-x_i).grad_i W_ij / r^2 V_j
+
+    The form of Morris, Fox and Zhu (1997): each component on its own, so that on a lattice, where
+    the sum over a stencil is isotropic to second order, it is the Laplacian to 0.1 percent at h = 2
+    dx. `LaminarViscosity` is there 4 percent off, one way along lattice lines and the other across.
+    It does not conserve angular momentum.
+
+    Args:
+        viscosity: kinematic viscosity nu [m^2/s].
+    """
+
+    viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def rate_terms(self, space):
+        return (PairTerm("laplacian_sum", ("velocity",), laplacian_sum),)
+
+    def wall_rate_terms(self, space):
+        return (WallTerm("laplacian_sum", ("velocity",), ("velocity",), laplacian_sum),)
+
+    def rates(self, context, fields, sums):
+        factor = 2.0 * self.viscosity * context.fluid.reference_density / fields["density"]
+        return {"velocity": factor[:, None] * sums["laplacian_sum"]}
