@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom
+from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom, tensor_stability
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
 from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
@@ -176,3 +176,14 @@ def test_tensor_models_are_taken_up_again(tmp_path, capsys):
     assert results(path)["rows"] == read["rows"]
     assert tensor_rom.main([*same, "--iterations", "30"]) == 2
     assert "other settings" in capsys.readouterr().err
+
+
+def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
+    path = tmp_path / "stability.json"
+    arguments = ["--resolution", "24", "--end-time", "0.05", "--modes", "3", "--json", str(path)]
+    assert tensor_stability.main(arguments) == 0
+    rows = results(path)["rows"]
+    assert [row["modes"] for row in rows] == [1, 1, 1, 2, 2, 2, 3, 3, 3]
+    for row in rows:
+        assert row["stable"] and row["highest_energy_over_start"] <= 1.001
+    assert "9 of 9 runs stable" in capsys.readouterr().out
