@@ -4,6 +4,9 @@ from .closure import FittedClosure as FittedClosure
 from .closure import ProjectedRun as ProjectedRun
 from .closure import fit_linear_closure as fit_linear_closure
 from .closure import rollout as rollout
+from .flow_file import FlowFileError as FlowFileError
+from .flow_file import load_flow as load_flow
+from .flow_file import save_flow as save_flow
 from .log_density import from_log_density as from_log_density
 from .log_density import to_log_density as to_log_density
 from .quadratic_system import QuadraticSystem as QuadraticSystem
