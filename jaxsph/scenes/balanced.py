@@ -40,17 +40,24 @@ def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Sc
         iterations: at most.
 
     Raises:
-        ValueError: if the scene has walls.
+        ValueError: if the scene has walls, or no better balance is found.
     """
     if scene.walls is not None:
         raise ValueError("balanced: a scene with walls starts from rest; leave it as it is.")
     neighbors = scene.search().build(scene.state.position)
-    density = _solved(scene.functional(), scene.state, neighbors, tolerance, iterations)
+    density, before, after = _solved(
+        scene.functional(), scene.state, neighbors, tolerance, iterations
+    )
+    if not float(after) <= float(before):  # a NaN too
+        raise ValueError(
+            f"balanced: the imbalance went from {float(before):.3g} to {float(after):.3g}; "
+            "start from particles that are more even, or leave the scene as it is."
+        )
     return eqx.tree_at(lambda s: s.state.density, scene, density)
 
 
 @eqx.filter_jit
-def _solved(functional, state, neighbors, tolerance: float, iterations: int) -> Array:
+def _solved(functional, state, neighbors, tolerance: float, iterations: int):
     space, time = functional.space, jnp.zeros((), state.density.dtype)
     volume = jnp.full_like(state.density, space.spacing**space.box.dim)
     itself = space.kernel.value(time, space.smoothing_length, space.box.dim)
@@ -73,5 +80,7 @@ def _solved(functional, state, neighbors, tolerance: float, iterations: int) -> 
     def operator(change):  # minus a smoothed Laplacian times c0^2: positive
         return -smoothed(slope(smoothed(change)))
 
-    change, _ = cg(operator, smoothed(residual), tol=tolerance, maxiter=iterations)
-    return state.density + smoothed(change)
+    wanted = smoothed(residual)
+    change, _ = cg(operator, wanted, tol=tolerance, maxiter=iterations)
+    left = wanted - operator(change)
+    return state.density + smoothed(change), jnp.linalg.norm(wanted), jnp.linalg.norm(left)

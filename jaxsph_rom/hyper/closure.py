@@ -105,7 +105,7 @@ def fit_linear_closure(
 
     Raises:
         ValueError: if there is no run, one differs from the system in its modes, or is shorter
-            than the window.
+            than the window; if the training diverges.
     """
     _check(system, runs if held_back is None else [*runs, held_back], window)
     mean = float(np.mean([run.viscosity for run in runs]))
@@ -161,6 +161,10 @@ def fit_linear_closure(
                 best = correction
         if progress is not None:
             progress(every)
+    if not np.isfinite(training).all():
+        raise ValueError(
+            "closure: the loss is not finite; lower the learning rate or shorten the window."
+        )
     if held_back is None:
         return FittedClosure(closed(correction), training, None)
     return FittedClosure(closed(best), training, validation)

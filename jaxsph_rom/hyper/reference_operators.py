@@ -12,6 +12,7 @@ from jaxsph import PairTerm, ParticleState, SPHFunctional, VerletList, WallList
 from jaxsph.effects import (
     Effect,
     IsotropicViscosity,
+    KickAndHold,
     LaminarViscosity,
     ParticleShifting,
     ShiftingTransport,
@@ -81,8 +82,14 @@ class ReferenceOperators(eqx.Module):
         """Operators of a scene; its viscosity is a parameter of `affine`.
 
         Raises:
-            ValueError: if the box is too small for the kernel's support.
+            ValueError: if the box is too small for the kernel's support, or a force of the scene
+                changes with time.
         """
+        if any(isinstance(e, KickAndHold) for e in scene.effects):
+            raise ValueError(
+                "effects: KickAndHold changes with time, a constant part does not; use "
+                "`ReducedModel` for this scene."
+            )
         kept = tuple(
             IsotropicViscosity(e.viscosity) if isinstance(e, LaminarViscosity) else e
             for e in scene.effects

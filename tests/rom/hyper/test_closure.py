@@ -76,6 +76,10 @@ def test_what_cannot_be_learnt_from_is_refused():
     system, one = oscillator(), run(oscillator(), 0.01)
     with pytest.raises(ValueError, match="at least one run"):
         fit_linear_closure(system, [], STEP, EACH)
+    with pytest.raises(ValueError, match="loss is not finite"):
+        fit_linear_closure(
+            oscillator(0.55), [one], STEP, EACH, window=20, iterations=40, learning_rate=1e200
+        )
     with pytest.raises(ValueError, match="window: 100 intervals, but a run has 61"):
         fit_linear_closure(system, [one], STEP, EACH, window=100)
     short = ProjectedRun(0.01, one.coordinates[:, :2])

@@ -10,7 +10,7 @@ from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import IsotropicViscosity
 from jaxsph.integrate import integrate
-from jaxsph.scenes import couette, lid_driven_cavity, taylor_green
+from jaxsph.scenes import couette, lid_driven_cavity, open_cavity, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph_rom import Energy, ReferenceSpace, pod
 from jaxsph_rom.hyper import (
@@ -157,3 +157,9 @@ def test_a_run_is_mapped_into_log_density():
     snapshots = ReferenceSpace(scene.state.position, scene.space).snapshots(trajectory)
     logarithms = to_log_density(jnp.asarray(snapshots[:, 0]), scene.fluid)
     assert snapshots.shape[2] == len(trajectory.time) and bool(jnp.isfinite(logarithms).all())
+
+
+def test_a_force_that_changes_with_time_is_refused():
+    scene = open_cavity(16)
+    with pytest.raises(ValueError, match="KickAndHold changes with time"):
+        ReferenceOperators.of_scene(scene, scene.state.position)
