@@ -17,9 +17,9 @@ class IsotropicViscosity(Effect):
     """du_i/dt = rho0/rho_i 2 nu sum_j (u_j-u_i) (x_j-x_i).grad_i W_ij / r^2 V_j
 
     The form of Morris, Fox and Zhu (1997): each component on its own, so that on a lattice it
-    treats a shear and a vortex alike. `LaminarViscosity` is there 4 percent too weak for the one and too
-    strong for the other at h = 2 dx (`benchmarks.viscous_sum`). It does not conserve angular
-    momentum.
+    treats a shear and a vortex alike. `LaminarViscosity` is there 4 percent too weak for the one
+    and too strong for the other at h = 2 dx (`benchmarks.viscous_sum`). It does not conserve
+    angular momentum.
 
     Args:
         viscosity: kinematic viscosity nu [m^2/s].
