@@ -1,11 +1,20 @@
 """Projection-based reduced models of smoothed-particle hydrodynamics."""
 
 from .basis import Basis as Basis
+from .basis import Centring as Centring
 from .basis import Energy as Energy
 from .basis import Euclidean as Euclidean
 from .basis import InnerProduct as InnerProduct
+from .basis import MeanCentred as MeanCentred
+from .basis import RestCentred as RestCentred
+from .basis import Uncentred as Uncentred
+from .basis import block_pod as block_pod
 from .basis import cumulative_energy as cumulative_energy
+from .basis import low_pass as low_pass
+from .basis import modes_for_energy as modes_for_energy
+from .basis import modes_for_error as modes_for_error
 from .basis import pod as pod
+from .basis import projection_errors as projection_errors
 from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
 from .field_advection import PaperAdvection as PaperAdvection

@@ -38,7 +38,7 @@ class ReducedState(eqx.Module):
 class ReducedModel(Model):
     """A projection-based reduced model on moving particles (paper, section 3.3):
 
-        d(w^)/dt = projection of f-bar(Phi~(x) w^),    dx/dt = u~ + du~.
+        d(w^)/dt = projection of f-bar(centre + Phi~(x) w^),    dx/dt = u~ + du~.
 
     As modes do not keep particles inside walls, those that come too near are put back after each
     step. It runs in the full model's loop. At every stage the modes are carried to the particles by
@@ -47,7 +47,7 @@ class ReducedModel(Model):
     Args:
         functional: f-bar, the Eulerian SPH functional.
         projection: `Galerkin()` or `AdjointPetrovGalerkin(tau)`.
-        splines: of all modes, functions ordered (field, mode).
+        splines: of `basis.functions`, ordered (field, function).
         basis: the modes at the reference points, with centre and inner product.
         search: neighbour search.
     """
@@ -68,7 +68,17 @@ class ReducedModel(Model):
         advection: Advection | None = None,
         margin: float | None = None,
     ) -> ReducedModel:
-        """The reduced model of a scene; its parameters (viscosity and so on) are the scene's."""
+        """The reduced model of a scene; its parameters (viscosity and so on) are the scene's.
+
+        Raises:
+            ValueError: if the splines are not of `basis.functions`.
+        """
+        wanted, found = basis.functions[0].size, splines.linear_weights.shape[2]
+        if found != wanted:
+            raise ValueError(
+                f"splines: of {found} functions, but the basis has {wanted}; fit them to "
+                "`basis.functions`."
+            )
         advection = PaperAdvection() if advection is None else advection
         functional = eqx.tree_at(
             lambda f: f.effects,
@@ -86,14 +96,12 @@ class ReducedModel(Model):
         )
         return cls(functional, projection, splines, basis, scene.search(margin=margin))
 
-    def modes_at(self, position: Array) -> Float[Array, "particles fields modes"]:
-        """Phi~(x): the modes at particle positions."""
-        fields, count = self.basis.modes.shape[1:]
-        return self.splines(position).reshape(position.shape[0], fields, count)
-
-    def state_at(self, modes: Array, coordinates: Array) -> Float[Array, "particles fields"]:
-        """(rho, u) = centre + Phi~ w^."""
-        return self.basis.centre[None, :] + modes @ coordinates
+    def basis_at(
+        self, position: Array
+    ) -> tuple[Float[Array, "particles fields modes"], Float[Array, "#particles fields"]]:
+        """Phi~(x) and the centre at particle positions."""
+        fields = self.basis.modes.shape[1]
+        return self.basis.parts(self.splines(position).reshape(position.shape[0], fields, -1))
 
     def pseudo_inverse(self, modes: Array) -> PseudoInverse:
         """Phi~^+ in the basis' inner product."""
@@ -103,13 +111,14 @@ class ReducedModel(Model):
     def project(self, state: ParticleState) -> ReducedState:
         """The reduced state nearest to a full one, at the same positions."""
         fields = jnp.concatenate([state.density[:, None], state.velocity], axis=1)
-        fluctuation = (fields - self.basis.centre[None, :]).reshape(-1)
-        inverse = self.pseudo_inverse(self.modes_at(state.position))
-        return ReducedState(inverse(fluctuation), state.position)
+        modes, centre = self.basis_at(state.position)
+        inverse = self.pseudo_inverse(modes)
+        return ReducedState(inverse((fields - centre).reshape(-1)), state.position)
 
     def reconstruct(self, state: ReducedState) -> ParticleState:
-        """The full state that a reduced one stands for."""
-        fields = self.state_at(self.modes_at(state.position), state.coordinates)
+        """The full state that a reduced one stands for, (rho, u) = centre + Phi~ w^."""
+        modes, centre = self.basis_at(state.position)
+        fields = centre + modes @ state.coordinates
         return ParticleState(state.position, fields[:, 1:], fields[:, 0])
 
     def prepare(self, state):
@@ -120,8 +129,8 @@ class ReducedModel(Model):
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
     def rates(self, time, state, auxiliary):
-        modes = self.modes_at(state.position)
-        fields = self.state_at(modes, state.coordinates)
+        modes, centre = self.basis_at(state.position)
+        fields = centre + modes @ state.coordinates
 
         def full_rates(stacked):
             fields = stacked.reshape(modes.shape[:2])
@@ -148,7 +157,7 @@ class ReducedModel(Model):
         position, coordinates = state.position, state.coordinates
         wild = ~jnp.isfinite(jnp.sum(position, axis=1))
         lost = ~jnp.all(jnp.isfinite(coordinates))
-        density = self.basis.centre[0] + self.basis.modes[:, 0, :] @ coordinates
+        density = self.basis.centre[:, 0] + self.basis.modes[:, 0, :] @ coordinates
         ratio = lax.stop_gradient(density / self.functional.fluid.reference_density)
         out = (ratio < DENSITY_BOUNDS[0]) | (ratio > DENSITY_BOUNDS[1])
         return Fault.first_of(

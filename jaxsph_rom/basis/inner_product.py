@@ -1,4 +1,4 @@
-"""How states are measured: inner product and centre of the state space."""
+"""How states are measured: the inner product of the state space."""
 
 from __future__ import annotations
 
@@ -10,31 +10,35 @@ from jaxtyping import Array, Float
 
 from jaxsph import Fluid
 
+from .centring import Centring, RestCentred, Uncentred
+
 
 class InnerProduct(eqx.Module):
-    """<a, b> = sum over points and fields f of w_f a_f b_f, about a centre; fields (rho, u)."""
+    """<a, b> = sum over points and fields f of w_f a_f b_f; fields (rho, u)."""
 
     @abc.abstractmethod
     def weights(self, fluid: Fluid, dim: int) -> Float[Array, " fields"]:
         """w_f of density and velocity components."""
 
+    @property
     @abc.abstractmethod
-    def centre(self, fluid: Fluid, dim: int) -> Float[Array, " fields"]:
-        """The state from which fluctuations are taken, per field."""
+    def centring(self) -> Centring:
+        """Where fluctuations are taken from unless one says otherwise."""
 
 
 class Euclidean(InnerProduct):
-    """The raw stacked state, uncentred and unscaled (paper)."""
+    """The raw stacked state, unscaled; uncentred unless one says otherwise (paper)."""
 
     def weights(self, fluid, dim):
         return jnp.ones(1 + dim, fluid.reference_density.dtype)
 
-    def centre(self, fluid, dim):
-        return jnp.zeros(1 + dim, fluid.reference_density.dtype)
+    @property
+    def centring(self):
+        return Uncentred()
 
 
 class Energy(InnerProduct):
-    """Kinetic plus acoustic energy about the state of rest:
+    """Kinetic plus acoustic energy, about the state of rest unless one says otherwise:
 
         <w, w> = sum |u|^2 + (c0 / rho0)^2 (rho - rho0)^2,
 
@@ -45,5 +49,6 @@ class Energy(InnerProduct):
         ratio = fluid.sound_speed / fluid.reference_density
         return jnp.ones(1 + dim, ratio.dtype).at[0].set(ratio**2)
 
-    def centre(self, fluid, dim):
-        return jnp.zeros(1 + dim, fluid.reference_density.dtype).at[0].set(fluid.reference_density)
+    @property
+    def centring(self):
+        return RestCentred()

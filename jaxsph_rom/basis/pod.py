@@ -5,10 +5,11 @@ from __future__ import annotations
 import equinox as eqx
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from jaxsph import Fluid
 
+from .centring import Centring
 from .inner_product import InnerProduct
 
 
@@ -17,13 +18,13 @@ class Basis(eqx.Module):
 
     Args:
         modes: (G, F, M); field 0 is density [kg/m^3 per unit coordinate], then velocity.
-        centre: (F,) state about which the modes are taken.
+        centre: (G, F) state about which the modes are taken, (1, F) if it is the same everywhere.
         weights: (F,) of the inner product.
-        singular_values: of the whole snapshot matrix.
+        singular_values: of the whole snapshot matrix, those of the modes first.
     """
 
     modes: Float[np.ndarray, "points fields modes"]
-    centre: Float[np.ndarray, " fields"]
+    centre: Float[np.ndarray, "#points fields"]
     weights: Float[np.ndarray, " fields"]
     singular_values: Float[np.ndarray, " snapshots"]
 
@@ -44,12 +45,28 @@ class Basis(eqx.Module):
             )
         return eqx.tree_at(lambda b: b.modes, self, self.modes[:, :, :modes])
 
+    @property
+    def functions(self) -> Float[np.ndarray, "points fields functions"]:
+        """What is carried to other points: the modes, and behind them a centre that varies."""
+        if len(self.centre) == 1:
+            return self.modes
+        return np.concatenate([self.modes, self.centre[:, :, None]], axis=2)
+
+    def parts(
+        self, functions: Float[Array, "places fields functions"]
+    ) -> tuple[Float[Array, "places fields modes"], Float[Array, "#places fields"]]:
+        """Modes and centre at the places where `functions` were carried to."""
+        if len(self.centre) == 1:
+            return functions, self.centre
+        return functions[:, :, :-1], functions[:, :, -1]
+
 
 def pod(
     snapshots: Float[np.ndarray, "points fields times"],
     product: InnerProduct,
     fluid: Fluid,
     modes: int | None = None,
+    centring: Centring | None = None,
 ) -> Basis:
     """POD of snapshots by singular value decomposition (paper, eq. SVD), in an inner product.
 
@@ -58,6 +75,7 @@ def pod(
         product: `Euclidean()` is the paper's.
         fluid: gives the product its scales.
         modes: how many to keep; all if none is given.
+        centring: the product's own if none is given.
 
     Raises:
         ValueError: if there are fewer snapshots than modes, or a value is not finite.
@@ -69,15 +87,36 @@ def pod(
             f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; "
             "ask for fewer modes or record more snapshots."
         )
-    if not np.isfinite(snapshots).all():
-        raise ValueError("snapshots: a value is not finite; the full model's run has failed.")
-    centre = np.asarray(product.centre(fluid, fields - 1))
-    weights = np.asarray(product.weights(fluid, fields - 1))
-    scale = np.sqrt(weights)[None, :, None]
-    matrix = ((snapshots - centre[None, :, None]) * scale).reshape(points * fields, times)
+    scaled, centre, weights = weighted_fluctuations(snapshots, product, fluid, centring)
+    matrix = scaled.reshape(points * fields, times)
     left, sigma, _ = scipy.linalg.svd(matrix, full_matrices=False, overwrite_a=True)
     left = left[:, : (modes or count)].reshape(points, fields, -1)
-    return Basis(modes=left / scale, centre=centre, weights=weights, singular_values=sigma)
+    left /= np.sqrt(weights)[None, :, None]
+    return Basis(modes=left, centre=centre, weights=weights, singular_values=sigma)
+
+
+def weighted_fluctuations(
+    snapshots: Float[np.ndarray, "points fields times"],
+    product: InnerProduct,
+    fluid: Fluid,
+    centring: Centring | None,
+) -> tuple[
+    Float[np.ndarray, "points fields times"],
+    Float[np.ndarray, "#points fields"],
+    Float[np.ndarray, " fields"],
+]:
+    """sqrt(w_f) (snapshots - centre), whose plain product is the inner product; centre and w_f.
+
+    Raises:
+        ValueError: if a value is not finite.
+    """
+    if not np.isfinite(snapshots).all():
+        raise ValueError("snapshots: a value is not finite; the full model's run has failed.")
+    centring = product.centring if centring is None else centring
+    centre = centring.centre(snapshots, fluid)
+    weights = np.asarray(product.weights(fluid, snapshots.shape[1] - 1))
+    scaled = (snapshots - centre[:, :, None]) * np.sqrt(weights)[None, :, None]
+    return scaled, centre, weights
 
 
 def cumulative_energy(singular_values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:

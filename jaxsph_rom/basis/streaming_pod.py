@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jaxsph import Fluid
 
+from .centring import Centring
 from .inner_product import InnerProduct
 from .pod import Basis
 
@@ -20,6 +21,7 @@ def streaming_pod(
     fluid: Fluid,
     modes: int | None = None,
     rank: int | None = None,
+    centring: Centring | None = None,
 ) -> Basis:
     """POD of a snapshot matrix X = [C_1, ..., C_J] of which one block C_j is held at a time:
 
@@ -46,11 +48,13 @@ def streaming_pod(
         ||X - U_M U_M^T X||_F^2 <= ||X||_F^2 - sum_{i<=M} sigma_i^2.
 
     Args:
-        blocks: (G, F, s) each, density first, with any s; gone through once.
+        blocks: (G, F, s) each, density first, with any s; gone through once, or twice for a
+            centre that depends on the snapshots.
         product: `Euclidean()` is the paper's.
         fluid: gives the product its scales.
         modes: how many to keep; all if none is given.
         rank: how many columns of U to carry from block to block; all if none is given.
+        centring: the product's own if none is given.
 
     Returns:
         the basis as of `pod`, with as many singular values as columns of U were carried: under a
@@ -58,15 +62,18 @@ def streaming_pod(
 
     Raises:
         ValueError: if there are fewer modes in the snapshots, or in the rank, than asked for, if
-            blocks differ in points or fields, or if a value is not finite.
+            blocks differ in points or fields, or if a value is not finite; if blocks that go
+            by once are to be centred by their mean.
     """
     _check_wanted(modes, rank)
+    centring = product.centring if centring is None else centring
+    centre = _centre_of_all(blocks, centring, fluid) if centring.of_snapshots else None
     shape, times = None, 0
     for block in blocks:
         _check_shape(block, shape)
         if shape is None:
             shape = block.shape[:2]
-            centre = np.asarray(product.centre(fluid, shape[1] - 1))
+            centre = centring.centre(block, fluid) if centre is None else centre
             weights = np.asarray(product.weights(fluid, shape[1] - 1))
             scale = np.sqrt(weights)[None, :, None]
             dtype = np.result_type(block, centre, weights)
@@ -76,7 +83,7 @@ def streaming_pod(
         kept, times = len(sigma), times + block.shape[2]
         columns = np.empty((len(left), kept + block.shape[2]), dtype, order="F")  # as LAPACK's
         np.multiply(left, sigma, out=columns[:, :kept])
-        scaled = (block - centre[None, :, None]) * scale
+        scaled = (block - centre[:, :, None]) * scale
         columns[:, kept:] = scaled.reshape(len(left), -1)
         del block, scaled, left  # before LAPACK works and the next block is made
         left, sigma = _left_factors(columns, rank)
@@ -86,7 +93,7 @@ def streaming_pod(
     count = len(sigma)
     if count == 0:
         raise ValueError(
-            f"snapshots: all {times} are the centre of the inner product, which has no modes; "
+            f"snapshots: all {times} are the centre, which has no modes; "
             "record a longer run."
         )
     if modes is not None and modes > count:
@@ -96,6 +103,25 @@ def streaming_pod(
         )
     left = left[:, : (modes or count)].reshape(*shape, -1)
     return Basis(modes=left / scale, centre=centre, weights=weights, singular_values=sigma)
+
+
+def _centre_of_all(
+    blocks: Iterable[np.ndarray], centring: Centring, fluid: Fluid
+) -> Float[np.ndarray, "points fields"]:
+    """The mean over all snapshots of the centres of their blocks."""
+    if iter(blocks) is blocks:
+        raise ValueError(
+            "blocks: this centring goes through them twice, but they are an iterator, which goes "
+            "by once; give a list, or an object whose __iter__ starts anew."
+        )
+    total, times, shape = 0.0, 0, None
+    for block in blocks:
+        _check_shape(block, shape)
+        shape = block.shape[:2]
+        if block.shape[2]:
+            total = total + block.shape[2] * centring.centre(block, fluid)
+            times += block.shape[2]
+    return total / max(times, 1)
 
 
 def _left_factors(

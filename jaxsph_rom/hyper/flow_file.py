@@ -27,7 +27,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _LAYOUT = {
     "points": ("points dim", "m"),
     "modes": ("points fields modes", "of the fields, per unit coordinate"),
-    "centre": ("fields", "of the fields"),
+    "centre": ("places fields", "of the fields; one place stands for all points"),
     "weights": ("fields", "of the inner product"),
     "singular_values": ("values", "of the inner product"),
     "constant": ("two modes", "coordinate/s; second row per m^2/s"),
@@ -105,7 +105,8 @@ def load_flow(path: str | os.PathLike) -> ReducedFlow:
             _check(path, attributes)
             arrays = {name: file[name][...] for name in _LAYOUT}
         sizes = _sizes(arrays)
-        if sizes["fields"] != sizes["dim"] + 1 or sizes["two"] != 2:
+        whole = sizes["places"] in (1, sizes["points"])
+        if sizes["fields"] != sizes["dim"] + 1 or sizes["two"] != 2 or not whole:
             raise ValueError("fields")
         return _assembled(attributes, arrays)
     except FlowFileError:

@@ -63,6 +63,8 @@ def skew_symmetric(carried: Float[Array, "carrier test carried"]) -> Array:
     """u . grad w + (div u) w / 2, tested: the half of <v, u . grad w> - <w, u . grad v>.
 
     It moves energy between modes and makes none, whatever the divergence left in the discrete u.
+    Here w is the fluctuation about rest: (div u) w / 2 of a uniform density would change the speed
+    of sound.
     """
     return 0.5 * (carried - jnp.swapaxes(carried, 1, 2))
 
@@ -77,6 +79,9 @@ def galerkin_system(
 
         da/dt = Phi^T W f(centre + Phi a)
 
+    Advection takes the centre's distance from rest as one more mode, of coordinate 1, so that its
+    form is that of the whole fluctuation about rest, whatever the centre.
+
     Args:
         scene: its effects and walls; the viscosity stays a parameter.
         basis: modes of (r, u), r the logarithmic density, orthonormal in its product.
@@ -87,43 +92,46 @@ def galerkin_system(
     dtype = operators.points.dtype
     modes = jnp.asarray(basis.modes, dtype)
     centre = jnp.broadcast_to(jnp.asarray(basis.centre, dtype), modes.shape[:2])
-    weighted = modes * jnp.asarray(basis.weights, dtype)[None, :, None]
-    return _assembled(operators, modes, centre, weighted, form)
+    return _assembled(operators, modes, centre, jnp.asarray(basis.weights, dtype), form)
 
 
 @eqx.filter_jit
-def _assembled(operators, modes, centre, weighted, form) -> QuadraticSystem:
-    test = weighted.reshape(-1, weighted.shape[2]).T
-    flat = (-1, modes.shape[2])
+def _assembled(operators, modes, centre, weights, form) -> QuadraticSystem:
+    rest = operators.rest
+    functions = jnp.concatenate([(centre - rest)[:, :, None], modes], axis=2)
+    weighted = functions * weights[None, :, None]
 
-    def slopes(function, *arguments):
+    def tested(fields):
+        return jnp.einsum("gfk,gf...->k...", weighted, fields)
+
+    def slopes(function, stack, *arguments):
         def along(mode):
             return jax.jvp(lambda f: function(f, *arguments), (centre,), (mode,))[1]
 
-        return mapped(along, modes)
+        return mapped(along, stack)
 
     inviscid, viscous = (
         (
-            test @ operators.affine(centre, nu).reshape(-1),
-            test @ slopes(operators.affine, nu).reshape(flat),
+            tested(operators.affine(centre, nu))[1:],
+            tested(slopes(operators.affine, modes, nu))[1:],
         )
         for nu in (jnp.zeros((), modes.dtype), jnp.ones((), modes.dtype))
     )
-    gradient, of_centre = slopes(operators.gradients), operators.gradients(centre)
-    velocity, mean = modes[:, 1:], centre[:, 1:]
+    velocity = jnp.moveaxis(functions[:, 1:], 2, 0)
+    gradient = slopes(operators.gradients, functions)
 
-    def carried(velocity, gradient):
-        return -jnp.einsum("gd,gfd...->gf...", velocity, gradient)
+    def carried(gradient):  # tested, by each velocity in turn
+        return lax.map(
+            lambda one: -tested(jnp.einsum("gd,gfd...->gf...", one, gradient)), velocity
+        )
 
-    centre_by_centre = test @ carried(mean, of_centre).reshape(-1)
-    centre_by_modes = -jnp.einsum("gdm,gfd->gfm", velocity, of_centre)
-    with_centre = test @ (carried(mean, gradient) + centre_by_modes).reshape(flat)
-    by_modes = lax.map(
-        lambda one: test @ carried(one, gradient).reshape(flat), jnp.moveaxis(velocity, 2, 0)
-    )  # [i, k, j]: mode j carried by mode i
-    by_modes = form(by_modes)
+    by_walls = carried(operators.gradients(rest))[:, 1:]  # [i, k]: moving walls' part, by mode i
+    advection = form(carried(gradient))  # [i, k, j]: function j carried by function i
+    by_centre, of_centre, by_modes = advection[0, 1:], advection[1:, 1:, 0], advection[1:, 1:, 1:]
+    constant = inviscid[0] + by_centre[:, 0] + by_walls[0]
+    linear = inviscid[1] + by_centre[:, 1:] + (of_centre + by_walls[1:]).T
     return QuadraticSystem(
-        jnp.stack([inviscid[0] + centre_by_centre, viscous[0] - inviscid[0]]),
-        jnp.stack([inviscid[1] + with_centre, viscous[1] - inviscid[1]]),
+        jnp.stack([constant, viscous[0] - inviscid[0]]),
+        jnp.stack([linear, viscous[1] - inviscid[1]]),
         0.5 * (jnp.transpose(by_modes, (1, 0, 2)) + jnp.transpose(by_modes, (1, 2, 0))),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ from jaxsph.integrate import SimulationError, integrate
 from jaxsph.interpolation import KernelMap, MovingLeastSquaresMap
 from jaxsph.scenes import Scene
 
-from ..basis import Basis, Energy, InnerProduct, pod
+from ..basis import Basis, Centring, Energy, InnerProduct, pod
 from ..reference import ReferenceSpace
 from ..splines import LocalSplines
 from .log_density import from_log_density, to_log_density
@@ -48,9 +48,11 @@ class ReducedFlow(eqx.Module):
         scene: Scene,
         runs: Sequence[Trajectory],
         points: Float[Array, "points dim"],
-        modes: int,
+        modes: int | tuple[int, int],
         product: InnerProduct | None = None,
         rule: type[KernelMap] = MovingLeastSquaresMap,
+        centring: Centring | None = None,
+        decompose: Callable[..., Basis] = pod,
     ) -> ReducedFlow:
         """Map the runs, decompose them, and project the scene's equations.
 
@@ -58,16 +60,19 @@ class ReducedFlow(eqx.Module):
             scene: whose effects are projected; its viscosity stays a parameter.
             runs: of the full model.
             points: of the reference space.
-            modes: how many.
+            modes: how many, as `decompose` takes it.
             product: `Energy()` if none is given.
             rule: of the map.
+            centring: the product's own if none is given.
+            decompose: `pod` or `block_pod`, or another with their arguments.
 
         Raises:
-            ValueError: as `ReferenceSpace.snapshots` and `pod`.
+            ValueError: as `ReferenceSpace.snapshots` and `decompose`.
         """
         reference = ReferenceSpace(points, scene.space, rule)
         mapped = np.concatenate([mapped_run(reference, run, scene.fluid) for run in runs], axis=-1)
-        basis = pod(mapped, Energy() if product is None else product, scene.fluid, modes)
+        product = Energy() if product is None else product
+        basis = decompose(mapped, product, scene.fluid, modes, centring)
         return cls(reference, basis, galerkin_system(scene, basis, points), scene.fluid)
 
     def truncated(self, modes: int) -> ReducedFlow:
@@ -82,9 +87,9 @@ class ReducedFlow(eqx.Module):
     def project(self, fields: Float[Array, "points fields *times"]) -> Float[Array, "*times modes"]:
         """Coordinates of (r, u) on the reference points, as `mapped_run` gives them."""
         modes, weights = jnp.asarray(self.basis.modes), jnp.asarray(self.basis.weights)
-        centre = jnp.asarray(self.basis.centre)
+        centre = jnp.broadcast_to(jnp.asarray(self.basis.centre), modes.shape[:2])
         weighted = modes * weights[None, :, None]
-        constant = jnp.einsum("gfm,f->m", weighted, centre)
+        constant = jnp.einsum("gfm,gf->m", weighted, centre)
         found = jnp.einsum("gfm,gf...->...m", weighted, jnp.asarray(fields))
         return found - constant.reshape((1,) * (found.ndim - 1) + (-1,))
 
@@ -122,13 +127,13 @@ class ReducedFlow(eqx.Module):
         Raises:
             ValueError: if the points crowd a cell of the splines.
         """
-        modes = self.basis.modes
+        modes, centre = self.basis.modes, self.basis.centre
         if points is None:
             points = np.asarray(self.reference.points)
         else:
-            modes = self._modes_at(points)
-        centre = jnp.asarray(self.basis.centre)[None, None, :]
-        fields = centre + jnp.einsum("gfm,sm->sgf", jnp.asarray(modes), coordinates)
+            modes, centre = self._basis_at(points)
+        change = jnp.einsum("gfm,sm->sgf", jnp.asarray(modes), coordinates)
+        fields = jnp.asarray(centre)[None] + change
         density = from_log_density(fields[..., 0], self.fluid)
         return Trajectory(
             time=np.asarray(time),
@@ -139,14 +144,14 @@ class ReducedFlow(eqx.Module):
             coordinates=np.asarray(coordinates),
         )
 
-    def _modes_at(self, points) -> Float[Array, "points fields modes"]:
-        shape, space = self.basis.modes.shape, self.reference.space
-        values = np.asarray(self.basis.modes).reshape(shape[0], -1)
-        splines = LocalSplines.fit(np.asarray(self.reference.points), values, space)
+    def _basis_at(self, points):
+        values, space = np.asarray(self.basis.functions), self.reference.space
+        flat = values.reshape(len(values), -1)
+        splines = LocalSplines.fit(np.asarray(self.reference.points), flat, space)
         points = jnp.asarray(points, self.reference.points.dtype)
         if bool(splines.overflow(points)):
             raise ValueError("points: too many in one cell of the splines; ask for some at a time.")
-        return splines(points).reshape(-1, *shape[1:])
+        return self.basis.parts(splines(points).reshape(-1, *values.shape[1:]))
 
 
 @eqx.filter_jit

@@ -115,13 +115,12 @@ class ReferenceOperators(eqx.Module):
             ),
             is_leaf=lambda x: isinstance(x, tuple),
         )
-        rest = jnp.zeros_like(fields).at[:, 0].set(self.functional.fluid.reference_density)
 
         def rates(fields):
             found = functional(jnp.zeros((), fields.dtype), self._state(fields), self.neighbors)
             return jnp.concatenate([found.density[:, None], found.velocity], axis=1)
 
-        value, slope = jax.jvp(rates, (rest,), (fields - rest,))
+        value, slope = jax.jvp(rates, (self.rest,), (fields - self.rest,))
         return value + slope
 
     def gradients(self, fields: Float[Array, "points fields"]) -> Float[Array, "points fields dim"]:
@@ -132,7 +131,6 @@ class ReferenceOperators(eqx.Module):
             (CarriedGradients(), *filter(_acts_on_ghosts, self.functional.effects)),
             is_leaf=lambda x: isinstance(x, tuple),
         )
-        rest = jnp.zeros_like(fields).at[:, 0].set(self.functional.fluid.reference_density)
 
         def gradients(fields):
             time = jnp.zeros((), fields.dtype)
@@ -142,8 +140,15 @@ class ReferenceOperators(eqx.Module):
             found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
             return self.neighbors.unsort(found)
 
-        value, slope = jax.jvp(gradients, (rest,), (fields - rest,))
+        value, slope = jax.jvp(gradients, (self.rest,), (fields - self.rest,))
         return value + slope
+
+    @property
+    def rest(self) -> Float[Array, "points fields"]:
+        """(rho0, 0)."""
+        count, dim = self.points.shape
+        rest = jnp.zeros((count, 1 + dim), self.points.dtype)
+        return rest.at[:, 0].set(self.functional.fluid.reference_density)
 
     @property
     def space(self):

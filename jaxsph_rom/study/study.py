@@ -17,7 +17,7 @@ from jaxsph.io import read_trajectory
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
 
-from ..basis import Basis, Euclidean, InnerProduct, pod
+from ..basis import Basis, Centring, Euclidean, InnerProduct, pod
 from ..field_advection import Advection, PaperAdvection
 from ..model import ReducedModel, ReducedState
 from ..projection import AdjointPetrovGalerkin, Galerkin, Projection
@@ -65,12 +65,13 @@ class Study:
         make: a scene from a Reynolds number.
         folder: where trajectories are kept; a study that was cut short goes on from there.
         projections: to compare.
-        product: inner product and centre of the POD and the projection; the paper's if none.
+        product: inner product of the POD and the projection; the paper's if none.
         advection: how the Eulerian functional is made; the paper's if none.
         spline_order: of the polyharmonic splines.
         progress: opens a progress bar for each run.
         probes: where runs are compared, (P, n) [m] from a scene; the centre line if none is given.
         judged_from: time [s] from which on peaks and medians are taken.
+        centring: of the POD; the product's own if none.
     """
 
     def __init__(
@@ -84,11 +85,13 @@ class Study:
         progress: Progress | None = None,
         probes: Callable[[Scene], np.ndarray] | None = None,
         judged_from: float = 0.0,
+        centring: Centring | None = None,
     ):
         self.scene = cache(make)
         self.folder = Path(folder)
         self.projections = (Galerkin(),) if projections is None else projections
         self.product = Euclidean() if product is None else product
+        self.centring = self.product.centring if centring is None else centring
         self.advection = PaperAdvection() if advection is None else advection
         self.spline_order = spline_order
         self.progress = silent if progress is None else progress
@@ -138,13 +141,13 @@ class Study:
         first = experiment.trained_on[0]
         matrices = [self.snapshots(reynolds, first) for reynolds in experiment.trained_on]
         fluid = self.scene(first).fluid
-        return pod(np.concatenate(matrices, axis=-1), self.product, fluid, modes)
+        return pod(np.concatenate(matrices, axis=-1), self.product, fluid, modes, self.centring)
 
     def lagrangian_basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
         """POD basis of the training runs in Lagrangian space, for comparison."""
         runs = [lagrangian_snapshots(self.full(reynolds)) for reynolds in experiment.trained_on]
         fluid = self.scene(experiment.trained_on[0]).fluid
-        return pod(np.concatenate(runs, axis=-1), self.product, fluid, modes)
+        return pod(np.concatenate(runs, axis=-1), self.product, fluid, modes, self.centring)
 
     def run(self, experiment: Experiment) -> Iterator[Outcome]:
         """All reduced runs of an experiment, each compared with the full run."""
@@ -153,17 +156,25 @@ class Study:
             self.full(reynolds)
         basis = self.basis(experiment, max(experiment.modes))
         points = np.asarray(self.reference(experiment).points)
-        values = basis.modes.reshape(len(points), -1)
+        values = basis.functions.reshape(len(points), -1)
+        numbers = np.arange(values.shape[1]).reshape(basis.modes.shape[1], -1)
         space = self.scene(experiment.trained_on[0]).space
         splines = LocalSplines.fit(points, values, space, self.spline_order)
         for modes in experiment.modes:
             part = basis.truncated(modes)
-            kept = np.arange(values.shape[1]).reshape(-1, basis.size)[:, :modes].reshape(-1)
+            kept = np.delete(numbers, np.s_[modes : basis.size], axis=1).reshape(-1)
             for reynolds in experiment.reynolds:
                 for projection in self.projections:
                     yield self._reduced(
                         experiment, reynolds, part, splines.select(kept), projection
                     )
+
+    @property
+    def _product_name(self) -> str:
+        """The inner product, and the centring if it is not the product's own."""
+        product, centring = type(self.product).__name__, type(self.centring).__name__
+        own = isinstance(self.centring, type(self.product.centring))
+        return product if own else f"{product}-{centring}"
 
     def _reduced(self, experiment, reynolds, basis, splines, projection) -> Outcome:
         scene = self.scene(reynolds)
@@ -177,7 +188,7 @@ class Study:
                 "modes": basis.size,
                 "projection": projection.name,
                 "tau": tau,
-                "inner_product": type(self.product).__name__,
+                "inner_product": self._product_name,
                 "advection": self.advection.name,
                 "spline_order": self.spline_order,
             },
@@ -188,7 +199,7 @@ class Study:
                 jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
             )
 
-        product = type(self.product).__name__.lower()
+        product = self._product_name.lower()
         path = self.folder / "reduced" / f"{product}-{trained}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
         fault = None
@@ -218,7 +229,7 @@ class Study:
             modes=basis.size,
             projection=projection.name,
             tau=tau,
-            inner_product=type(self.product).__name__.lower(),
+            inner_product=self._product_name.lower(),
             hyper="none",
             trained_on=tuple(experiment.trained_on),
             velocity_peak_percent=float(percent[0][judged].max()),

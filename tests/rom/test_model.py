@@ -51,7 +51,7 @@ def reduced(scene, modes, projection, product=None, advection=None):
     dim, fluid = scene.space.box.dim, scene.fluid
     basis = Basis(
         modes,
-        np.asarray(product.centre(fluid, dim)),
+        product.centring.centre(modes, fluid),
         np.asarray(product.weights(fluid, dim)),
         np.ones(modes.shape[2]),
     )
@@ -157,7 +157,7 @@ def test_memory_is_the_jacobian_on_the_unresolved_rates(scene, disturbed):
 
     full = model.reconstruct(state)
     neighbors = model.prepare(state)
-    inverse = model.pseudo_inverse(model.modes_at(state.position))
+    inverse = model.pseudo_inverse(model.basis_at(state.position)[0])
     flat = jnp.concatenate([full.density[:, None], full.velocity], axis=1).reshape(-1)
 
     @jax.jit
@@ -172,6 +172,29 @@ def test_memory_is_the_jacobian_on_the_unresolved_rates(scene, disturbed):
     central = (f_bar(flat + eps * unresolved) - f_bar(flat - eps * unresolved)) / (2 * eps)
     expected = inverse(central)
     np.testing.assert_allclose(memory, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_the_rates_do_not_depend_on_the_centre(scene, disturbed):
+    """A centre that varies is carried to the particles: other coordinates, the same rates."""
+    modes, shift = some_modes(scene), np.array([0.3, -2.0, 1.0, 0.5])
+    models = [reduced(scene, modes, Galerkin(), Energy())]
+    basis = eqx.tree_at(lambda b: b.centre, models[0].basis, models[0].basis.centre + modes @ shift)
+    splines = LocalSplines.fit(
+        np.asarray(scene.state.position), basis.functions.reshape(len(modes), -1), scene.space
+    )
+    models.append(ReducedModel.of_scene(scene, basis, splines, Galerkin()))
+    moved = eqx.tree_at(lambda s: s.position, disturbed, disturbed.position + 0.01)
+    states = [eqx.filter_jit(m.project)(moved) for m in models]
+    np.testing.assert_allclose(states[1].coordinates + shift, states[0].coordinates, atol=1e-8)
+    full = [eqx.filter_jit(m.reconstruct)(s) for m, s in zip(models, states, strict=True)]
+    np.testing.assert_allclose(full[1].density, full[0].density, atol=1e-8)
+    np.testing.assert_allclose(full[1].velocity, full[0].velocity, atol=1e-8)
+    found = [rates(m, s) for m, s in zip(models, states, strict=True)]
+    scale = np.abs(found[0].coordinates).max()
+    np.testing.assert_allclose(found[1].coordinates, found[0].coordinates, atol=1e-7 * scale)
+    np.testing.assert_allclose(found[1].position, found[0].position, atol=1e-8)
+    with pytest.raises(ValueError, match="splines: of 12 functions, but the basis has 15"):
+        ReducedModel.of_scene(scene, basis, models[0].splines, Galerkin())
 
 
 def test_the_pseudo_inverse_is_weighted_least_squares():

@@ -33,7 +33,7 @@ def full_basis(scene):
     product = Energy()
     return Basis(
         modes,
-        np.asarray(product.centre(scene.fluid, 2)),
+        product.centring.centre(modes, scene.fluid),
         np.asarray(product.weights(scene.fluid, 2)),
         np.ones(modes.shape[2]),
     )
@@ -60,7 +60,7 @@ def test_a_full_basis_reproduces_the_full_models_rates_beside_walls(cavity):
     def reduced_rates(model, state):
         reduced = model.project(state)
         rates = model.rates(ZERO, reduced, neighbors)
-        return model.modes_at(state.position) @ rates.coordinates
+        return model.basis_at(state.position)[0] @ rates.coordinates
 
     found = np.asarray(reduced_rates(model, state))
     wanted = np.concatenate([expected.density[:, None], expected.velocity], axis=1)

@@ -33,7 +33,7 @@ def split(data, size):
 
 def matrix(data, basis):
     """The snapshot matrix that is decomposed."""
-    scaled = (data - basis.centre[None, :, None]) * np.sqrt(basis.weights)[None, :, None]
+    scaled = (data - basis.centre[:, :, None]) * np.sqrt(basis.weights)[None, :, None]
     return scaled.reshape(-1, data.shape[2])
 
 
@@ -150,7 +150,7 @@ def test_a_start_from_rest_is_no_trouble():
     wanted = pod(data, Energy(), FLUID).singular_values
     assert basis.size == 29 and wanted[29] < 1e-12
     np.testing.assert_allclose(basis.singular_values, wanted[:29], atol=ROUND_OFF * wanted[0])
-    with pytest.raises(ValueError, match="all 2 are the centre of the inner product"):
+    with pytest.raises(ValueError, match="all 2 are the centre, which"):
         streaming_pod([data[:, :, :1]] * 2, Energy(), FLUID)
 
 

@@ -1,5 +1,6 @@
 """A reduced flow in a file: there and back, and what is refused."""
 
+import equinox as eqx
 import h5py
 import jax.numpy as jnp
 import numpy as np
@@ -20,8 +21,8 @@ def flow():
     space = Space(Box((0.0, -1.0), (2.0, 0.5), (True, False)), WendlandC4(), 0.2, 0.1)
     points = Lattice().positions(space)
     basis = Basis(
-        rng.normal(size=(len(points), 3, 4)), np.array([1.0, 0.0, 0.0]), np.array([9.0, 1.0, 1.0]),
-        np.arange(7.0, 0.0, -1.0),
+        rng.normal(size=(len(points), 3, 4)), np.array([[1.0, 0.0, 0.0]]),
+        np.array([9.0, 1.0, 1.0]), np.arange(7.0, 0.0, -1.0),
     )  # fmt: skip
     system = QuadraticSystem(
         *(jnp.asarray(0.1 * rng.normal(size=shape)) for shape in ((2, 4), (2, 4, 4), (4, 4, 4)))
@@ -49,6 +50,17 @@ def test_a_flow_comes_back_as_it_was(flow, tmp_path):
     for name in ("reference_density", "sound_speed", "reference_speed"):
         assert getattr(found.fluid, name) == getattr(flow.fluid, name)
         assert getattr(found.fluid, name).dtype == flow.reference.points.dtype
+
+
+def test_a_centre_that_varies_is_kept(flow, tmp_path):
+    path = tmp_path / "flow.h5"
+    points = len(flow.reference.points)
+    centre = np.random.default_rng(1).normal(size=(points, 3))
+    save_flow(path, eqx.tree_at(lambda f: f.basis.centre, flow, centre))
+    np.testing.assert_array_equal(load_flow(path).basis.centre, centre)
+    save_flow(path, eqx.tree_at(lambda f: f.basis.centre, flow, centre[:2]))
+    with pytest.raises(FlowFileError, match="damaged"):
+        load_flow(path)
 
 
 def test_foreign_damaged_and_newer_files_are_refused(flow, tmp_path):

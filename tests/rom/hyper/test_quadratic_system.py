@@ -12,7 +12,7 @@ from jaxsph.effects import IsotropicViscosity
 from jaxsph.integrate import integrate
 from jaxsph.scenes import couette, lid_driven_cavity, open_cavity, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
-from jaxsph_rom import Energy, ReferenceSpace, pod
+from jaxsph_rom import Basis, Energy, ReferenceSpace, pod
 from jaxsph_rom.hyper import (
     ReferenceOperators,
     TensorModel,
@@ -20,7 +20,7 @@ from jaxsph_rom.hyper import (
     galerkin_system,
     to_log_density,
 )
-from jaxsph_rom.hyper.quadratic_system import advective
+from jaxsph_rom.hyper.quadratic_system import advective, skew_symmetric
 
 VISCOSITY = 0.01
 
@@ -53,13 +53,37 @@ def test_tensors_are_the_projected_operators(name, request):
     system = galerkin_system(scene, basis, points, advective)
     operators = ReferenceOperators.of_scene(scene, points)
     a = np.random.default_rng(1).normal(size=basis.size)
-    fields = jnp.asarray(basis.centre[None, :] + basis.modes @ a)
+    fields = jnp.asarray(basis.centre + basis.modes @ a)
     gradient = operators.gradients(fields)
     rates = operators.affine(fields, jnp.asarray(VISCOSITY))
     rates = rates - jnp.einsum("gd,gfd->gf", fields[:, 1:], gradient)
     wanted = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, rates)
     found = system(jnp.asarray(a), jnp.asarray(VISCOSITY))
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("form", [skew_symmetric, advective])
+@pytest.mark.parametrize("name", ["vortex", "cavity"])
+def test_the_system_does_not_depend_on_the_centre(name, form, request):
+    """About rest, about a mean that moves, and about zero: other coordinates, the same rates."""
+    scene = request.getfixturevalue(name)
+    some, points = random_basis(scene), scene.state.position
+    root = np.sqrt(some.weights)[None, :, None]
+    uniform = np.zeros_like(some.modes[:, :, :1])
+    uniform[:, 0] = 1.0
+    stacked = np.concatenate([uniform, some.modes], axis=2) * root
+    modes = np.linalg.qr(stacked.reshape(-1, 5))[0].reshape(stacked.shape) / root
+    about_rest = Basis(modes, some.centre, some.weights, some.singular_values)
+    wanted = galerkin_system(scene, about_rest, points, form)
+    rng = np.random.default_rng(2)
+    of_rest = np.einsum("gfm,f,gf->m", modes, some.weights, some.centre + 0.0 * modes[:, :, 0])
+    a, viscosity = rng.normal(size=5), jnp.asarray(VISCOSITY)
+    rates = wanted(jnp.asarray(a), viscosity)
+    for shift in (rng.normal(size=5), -of_rest):
+        moved = Basis(modes, some.centre + modes @ shift, some.weights, some.singular_values)
+        found = galerkin_system(scene, moved, points, form)(jnp.asarray(a - shift), viscosity)
+        scale = np.abs(rates).max() + np.abs(shift).max()  # that the terms have before they cancel
+        np.testing.assert_allclose(found, rates, rtol=0, atol=1e-10 * scale)
 
 
 def test_operators_are_the_full_models_right_hand_side_about_rest(vortex):
@@ -140,7 +164,7 @@ def test_a_vortex_decays_as_it_should_in_the_full_models_loop():
         snapshots.append(np.concatenate([density[:, None], velocity], axis=1))
     basis = pod(np.stack(snapshots, axis=-1), Energy(), scene.fluid, 2)
     model = TensorModel(galerkin_system(scene, basis, points), VISCOSITY)
-    first = snapshots[0] - basis.centre[None, :]
+    first = snapshots[0] - basis.centre
     start = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, first)
     _, fault, found, good = jax.jit(lambda a: integrate(model, a, 0, jnp.asarray(2e-3), 10, 10))(
         jnp.asarray(start)

@@ -7,6 +7,7 @@ import pytest
 from jaxsph import SimulationError, run_scene
 from jaxsph.arrangements import Lattice, Stirred
 from jaxsph.scenes import taylor_green
+from jaxsph_rom import Euclidean, MeanCentred, block_pod
 from jaxsph_rom.hyper import QuadraticSystem, ReducedFlow, mapped_run
 
 
@@ -43,6 +44,33 @@ def test_fields_at_other_points_are_exact_at_the_reference_points(flow_and_run):
     crowd = np.full((500, 2), 0.5)
     with pytest.raises(ValueError, match="too many in one cell"):
         flow.fields(coordinates, np.arange(2.0), crowd)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"modes": 4, "centring": MeanCentred()},
+        {"modes": (2, 3), "decompose": block_pod},
+        {"modes": 5, "decompose": block_pod, "centring": MeanCentred(), "product": Euclidean()},
+    ],
+)
+def test_any_centre_and_any_decomposition(flow_and_run, settings):
+    _, run, scene = flow_and_run
+    points = Lattice().positions(scene.space)
+    flow = ReducedFlow.train(scene, [run], points, **settings)
+    mapped = mapped_run(flow.reference, run, scene.fluid)
+    coordinates = flow.project(mapped)
+    fields = flow.fields(coordinates, run.time)
+    np.testing.assert_allclose(
+        flow.project(mapped_run_of(fields, flow, scene)), coordinates, rtol=0, atol=1e-9
+    )
+    found = flow.fields(coordinates[:2], run.time[:2], np.asarray(points)[5:90:7])
+    np.testing.assert_allclose(found.velocity, fields.velocity[:2, 5:90:7], atol=1e-9)
+    np.testing.assert_allclose(found.density, fields.density[:2, 5:90:7], atol=1e-7)
+    arguments = (0.01, scene.time_step, scene.steps_per_snapshot, len(run.time) - 1)
+    after = flow.fields(flow.predict(coordinates[0], *arguments), run.time[1:])
+    # the run that it knows, within a percent of the largest speed
+    assert np.abs(after.velocity - np.moveaxis(mapped[:, 1:, 1:], -1, 0)).max() < 0.01
 
 
 def mapped_run_of(fields, flow, scene):
