@@ -21,8 +21,11 @@ from .field_advection import PaperAdvection as PaperAdvection
 from .model import ReducedModel as ReducedModel
 from .model import ReducedState as ReducedState
 from .projection import AdjointPetrovGalerkin as AdjointPetrovGalerkin
+from .projection import ConvectiveMemory as ConvectiveMemory
 from .projection import Galerkin as Galerkin
+from .projection import MemoryLength as MemoryLength
 from .projection import Projection as Projection
+from .projection import SpectralMemory as SpectralMemory
 from .reference import ReferenceSpace as ReferenceSpace
 from .reference import lagrangian_snapshots as lagrangian_snapshots
 from .splines import LocalSplines as LocalSplines

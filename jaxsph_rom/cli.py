@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import sys
 from contextlib import contextmanager
@@ -28,13 +29,20 @@ from jaxsph.scenes import SCENES
 
 from .basis import Energy, Euclidean
 from .field_advection import ConsistentAdvection, PaperAdvection
-from .projection import AdjointPetrovGalerkin, Galerkin
+from .projection import (
+    AdjointPetrovGalerkin,
+    ConvectiveMemory,
+    Galerkin,
+    MemoryLength,
+    SpectralMemory,
+)
 from .report import format_table
 from .study import PLANS, Plan, Study, write_study
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
 PROJECTIONS = ("galerkin", "apg")
+MEMORIES = {rule.name: rule for rule in (SpectralMemory(), ConvectiveMemory())}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -72,8 +80,10 @@ def _parser() -> Parser:
         f"({_defaults('borders')}; else a global basis)")  # fmt: skip
     add("--projection", choices=PROJECTIONS, nargs="+", default=["galerkin"],
         help="Galerkin, adjoint Petrov-Galerkin, or both (default: galerkin)")  # fmt: skip
-    add("--tau", type=positive_float, metavar="T",
-        help=f"memory length of apg [s] ({_defaults('tau')})")  # fmt: skip
+    add("--tau", type=_memory, metavar="T",
+        help="memory length of apg [s], or a rule that finds it: 'auto' from the projected "
+        "Jacobian's spectral radius, 'convective' from that of its convective part "
+        f"({_defaults('tau')})")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="energy",
         help="of POD and projection (default: %(default)s; euclidean is the paper's)")  # fmt: skip
     add("--advection", choices=tuple(ADVECTIONS), default="paper",
@@ -132,6 +142,18 @@ def _run(options) -> int:
     return 0
 
 
+def _memory(text: str) -> float | MemoryLength:
+    """A memory length [s], or the rule of that name."""
+    if text in MEMORIES:
+        return MEMORIES[text]
+    try:
+        return positive_float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"a time in s, {' or '.join(MEMORIES)}, got {text!r}"
+        ) from None
+
+
 def _defaults(name: str) -> str:
     """The defaults of an option, scene by scene."""
     found: dict[str, list[str]] = {}
@@ -157,7 +179,7 @@ def _plan(options) -> Plan:
     for name in ("train", "predict", "modes", "borders"):
         if getattr(options, name) is not None:
             given[name] = tuple(dict.fromkeys(getattr(options, name)))
-    for name in ("tau", "slice_at", "settling"):
+    for name in ("slice_at", "settling"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     if {"train", "predict"} & set(given) and "borders" not in given:
@@ -184,10 +206,10 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         settings["arrangement"] = rule(seed=options.seed or 0)
 
     scene = plan.scenes(partial(make, **settings), folder, _bar)
-    projections = {
-        "galerkin": Galerkin(),
-        "apg": AdjointPetrovGalerkin(jax.numpy.asarray(plan.tau, options.precision)),
-    }
+    memory = plan.tau if options.tau is None else options.tau
+    if not isinstance(memory, MemoryLength):
+        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
+    projections = {"galerkin": Galerkin(), "apg": memory}
     return Study(
         lambda reynolds: scene(reynolds=reynolds),
         folder,

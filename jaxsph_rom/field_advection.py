@@ -74,6 +74,16 @@ class FieldAdvection(Effect):
         }
 
 
+def acts_on_ghosts(effect: Effect) -> bool:
+    """Whether an effect gives the ghosts at walls their values."""
+    return type(effect).ghost_fields is not Effect.ghost_fields
+
+
+def advection_alone(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """The advection of fields and nothing else, at walls with the ghosts' values."""
+    return (FieldAdvection(), *filter(acts_on_ghosts, effects))
+
+
 @dataclass(frozen=True)
 class Advection(abc.ABC):
     """How the Eulerian functional f-bar follows from a scene's effects."""

@@ -128,18 +128,23 @@ class ReducedModel(Model):
         speed = (1.0 + SHIFT_SHARE) * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
+    def stacked_rates(
+        self, time, stacked: Float[Array, " states"], position: Array, auxiliary
+    ) -> tuple[Float[Array, " states"], Float[Array, "particles dim"]]:
+        """f-bar of the stacked state (rho, u) at these positions, and dx/dt there."""
+        fields = stacked.reshape(position.shape[0], -1)
+        particles = ParticleState(position, fields[:, 1:], fields[:, 0])
+        rates = self.functional(time, particles, auxiliary)
+        stacked = jnp.concatenate([rates.density[:, None], rates.velocity], axis=1)
+        return stacked.reshape(-1), rates.position
+
     def rates(self, time, state, auxiliary):
         modes, centre = self.basis_at(state.position)
-        fields = centre + modes @ state.coordinates
+        stacked = (centre + modes @ state.coordinates).reshape(-1)
 
         def full_rates(stacked):
-            fields = stacked.reshape(modes.shape[:2])
-            particles = ParticleState(state.position, fields[:, 1:], fields[:, 0])
-            rates = self.functional(time, particles, auxiliary)
-            stacked = jnp.concatenate([rates.density[:, None], rates.velocity], axis=1)
-            return stacked.reshape(-1), rates.position
+            return self.stacked_rates(time, stacked, state.position, auxiliary)
 
-        stacked = fields.reshape(-1)
         rates, transport = full_rates(stacked)
         coordinates = self.projection.reduce(
             self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates

@@ -22,6 +22,8 @@ from jaxsph.effects import (
 from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
 
+from ..field_advection import acts_on_ghosts
+
 # what keeps particles evenly spread has nothing to do on fixed points
 _OF_PARTICLES = (ParticleShifting, ShiftingTransport, WallRepulsion)
 
@@ -128,7 +130,7 @@ class ReferenceOperators(eqx.Module):
         functional = eqx.tree_at(
             lambda f: f.effects,
             self.functional,
-            (CarriedGradients(), *filter(_acts_on_ghosts, self.functional.effects)),
+            (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects)),
             is_leaf=lambda x: isinstance(x, tuple),
         )
 
@@ -156,10 +158,6 @@ class ReferenceOperators(eqx.Module):
 
     def _state(self, fields) -> ParticleState:
         return ParticleState(self.points, fields[:, 1:], fields[:, 0])
-
-
-def _acts_on_ghosts(effect: Effect) -> bool:
-    return type(effect).ghost_fields is not Effect.ghost_fields
 
 
 def mapped(function, stack: Float[Array, "points fields modes"], *arguments):

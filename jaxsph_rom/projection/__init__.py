@@ -4,3 +4,7 @@ from .adjoint_petrov_galerkin import AdjointPetrovGalerkin as AdjointPetrovGaler
 from .base import Projection as Projection
 from .base import PseudoInverse as PseudoInverse
 from .galerkin import Galerkin as Galerkin
+from .memory_length import ConvectiveMemory as ConvectiveMemory
+from .memory_length import MemoryLength as MemoryLength
+from .memory_length import SpectralMemory as SpectralMemory
+from .memory_length import projected_jacobian as projected_jacobian

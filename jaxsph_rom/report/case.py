@@ -34,6 +34,7 @@ class Case:
         fom_steps, rom_steps: number of time steps in them.
         fom_compile_seconds, rom_compile_seconds: wall-clock time of compilation [s].
         compression_factor: N_d / M, numbers of the full state per reduced coordinate.
+        memory: rule and constant that gave tau, `auto-0.2` say; None where it was given itself.
         fault: why it is unstable, or None.
         fault_time: simulated time at which it failed [s], or None.
     """
@@ -58,6 +59,7 @@ class Case:
     fom_compile_seconds: float | None
     rom_compile_seconds: float | None
     compression_factor: float | None
+    memory: str | None = None
     fault: str | None = None
     fault_time: float | None = None
 

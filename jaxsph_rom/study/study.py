@@ -20,7 +20,7 @@ from jaxsph.scenes import Scene
 from ..basis import Basis, Centring, Euclidean, InnerProduct, pod
 from ..field_advection import Advection, PaperAdvection
 from ..model import ReducedModel, ReducedState
-from ..projection import AdjointPetrovGalerkin, Galerkin, Projection
+from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projection
 from ..reference import ReferenceSpace, lagrangian_snapshots
 from ..report import Case
 from ..splines import LocalSplines
@@ -64,7 +64,8 @@ class Study:
     Args:
         make: a scene from a Reynolds number.
         folder: where trajectories are kept; a study that was cut short goes on from there.
-        projections: to compare.
+        projections: to compare. A `MemoryLength` among them stands for the adjoint Petrov-Galerkin
+            projection with the memory length that it finds for each run.
         product: inner product of the POD and the projection; the paper's if none.
         advection: how the Eulerian functional is made; the paper's if none.
         spline_order: of the polyharmonic splines.
@@ -78,7 +79,7 @@ class Study:
         self,
         make: Callable[[float], Scene],
         folder: Path,
-        projections: tuple[Projection, ...] | None = None,
+        projections: tuple[Projection | MemoryLength, ...] | None = None,
         product: InnerProduct | None = None,
         advection: Advection | None = None,
         spline_order: int = 3,
@@ -178,9 +179,14 @@ class Study:
 
     def _reduced(self, experiment, reynolds, basis, splines, projection) -> Outcome:
         scene = self.scene(reynolds)
+        memory = None
+        if isinstance(projection, MemoryLength):
+            memory = projection
+            projection = self._petrov_galerkin(memory, scene, basis, splines)
         tau = float(projection.tau) if isinstance(projection, AdjointPetrovGalerkin) else None
         trained = "-".join(f"{r:g}" for r in experiment.trained_on)
         name = projection.name if tau is None else f"{projection.name}-{tau:g}"
+        name = name if memory is None else f"{projection.name}-{memory.label}"
         recorded = with_record(
             scene,
             reduced={
@@ -215,9 +221,16 @@ class Study:
             )
         except SimulationError as error:
             fault, run = error, read_trajectory(path)
-        return self._compare(experiment, reynolds, basis, projection, tau, run, fault)
+        memory = None if memory is None else memory.label
+        return self._compare(experiment, reynolds, basis, projection, tau, memory, run, fault)
 
-    def _compare(self, experiment, reynolds, basis, projection, tau, run, fault) -> Outcome:
+    def _petrov_galerkin(self, memory, scene, basis, splines) -> AdjointPetrovGalerkin:
+        model = ReducedModel.of_scene(scene, basis, splines, Galerkin(), self.advection)
+        tau = memory(model, eqx.filter_jit(model.project)(scene.state))
+        # rounded, so that a run that is taken up again finds the very number that it recorded
+        return AdjointPetrovGalerkin(jnp.asarray(float(f"{tau:.4g}"), scene.state.density.dtype))
+
+    def _compare(self, experiment, reynolds, basis, projection, tau, memory, run, fault) -> Outcome:
         scene, full = self.scene(reynolds), self.full(reynolds)
         profile = probe(run, self.probes(reynolds), scene.space)
         truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
@@ -229,6 +242,7 @@ class Study:
             modes=basis.size,
             projection=projection.name,
             tau=tau,
+            memory=memory,
             inner_product=self._product_name.lower(),
             hyper="none",
             trained_on=tuple(experiment.trained_on),

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from jaxsph_rom.cli import main
+from jaxsph_rom import ConvectiveMemory, SpectralMemory
+from jaxsph_rom.cli import _parser, main
 
 SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice"]
 KEYS = {
@@ -52,7 +53,8 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ([*SMALL, "--modes", "5000"], "5000"),
         ([*SMALL, "--h-over-dx", "9"], "too small"),
         ([*SMALL, "--time-step", "1"], "stability limit"),
-        ([*SMALL, "--tau", "x"], "--tau"),
+        ([*SMALL, "--tau", "x"], "--tau: a time in s, auto or convective, got 'x'"),
+        ([*SMALL, "--tau", "-1"], "--tau: a time in s"),
         (["run", "taylor-green", "--scale", "vast"], "vast"),
     ],
 )
@@ -62,3 +64,11 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and word in error
     assert not out.exists()
+
+
+def test_a_memory_length_is_a_time_or_a_rule():
+    def tau(text):
+        return _parser().parse_args(["run", "taylor-green", "--tau", text]).tau
+
+    assert tau("1e-4") == 1e-4 and tau("auto") == SpectralMemory()
+    assert tau("convective") == ConvectiveMemory()

@@ -1,0 +1,159 @@
+"""Memory lengths of the adjoint Petrov-Galerkin projection: fixed, or found from a Jacobian.
+
+    python -m benchmarks.memory_length
+
+The Taylor-Green vortex at Re 100, reconstructed on moving particles as in `benchmarks.paper_rom`,
+in the paper's inner product and in that of energy. Galerkin projection stands beside the paper's
+fixed memory length and C / |lambda_max| of the projected Jacobian, once of all of it and once of
+its convective part, at several C. Runs are kept in a folder and finished cases in the JSON file:
+the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from jaxsph import SimulationError
+from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph.environment import environment
+from jaxsph.io import check_target
+from jaxsph.scenes import taylor_green
+from jaxsph_rom import (
+    AdjointPetrovGalerkin,
+    ConvectiveMemory,
+    Experiment,
+    Galerkin,
+    SpectralMemory,
+    Study,
+)
+from jaxsph_rom.cli import PRODUCTS
+from jaxsph_rom.study import PLANS
+
+from .measure import format_rows, number, progress, read_json, tell, write_json
+
+REYNOLDS = 100.0
+CONSTANTS = (0.2, 0.02, 0.002)
+KEY = ("inner_product", "modes", "rule")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: a full run failed, 2: bad input."""
+    return report_errors("memory_length", _command, argv)
+
+
+def _command(argv) -> int:
+    options = _parser().parse_args(argv)
+    path = options.json or Path("benchmarks", "results", "memory_length.json")
+    check_target(path)
+    with jax.enable_x64(True):
+        results = _started(path, options)
+        try:
+            _run(path, results, options)
+        except SimulationError as error:
+            return fail("memory_length", f"full model: {error}", 1)
+    print(_table(results))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.memory_length", description=__doc__.splitlines()[0]
+    )
+    add = parser.add_argument
+    add("--resolution", type=positive_int, default=32, metavar="N",
+        help="particles per side (default: %(default)s)")  # fmt: skip
+    add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
+    add("--modes", type=positive_int, nargs="+", default=[5, 10], metavar="M",
+        help="numbers of modes (default: 5 10)")  # fmt: skip
+    add("--constants", type=positive_float, nargs="+", default=list(CONSTANTS), metavar="C",
+        help="of both rules (default: 0.2 0.02 0.002)")  # fmt: skip
+    add("--inner-product", choices=tuple(PRODUCTS), nargs="+", default=list(PRODUCTS),
+        help="of POD and projection (default: both)")  # fmt: skip
+    add("--out", type=Path, metavar="DIR",
+        help="where runs are kept (default: out/memory-length)")  # fmt: skip
+    add("--json", type=Path, metavar="FILE",
+        help="default: benchmarks/results/memory_length.json")  # fmt: skip
+    return parser
+
+
+def _started(path: Path, options) -> dict[str, Any]:
+    """The results so far.
+
+    Raises:
+        ValueError: if the file holds results of other settings.
+    """
+    settings = {"resolution": options.resolution, "end_time": options.end_time}
+    found = read_json(path) or {"settings": settings, "cases": []}
+    if found.get("settings") != settings:
+        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
+    return found
+
+
+def _rules(constants) -> dict[str, Any]:
+    """Projections and rules, by the name under which a case is kept."""
+    fixed = PLANS["taylor-green"].tau
+    rules = {"galerkin": Galerkin(), "fixed": AdjointPetrovGalerkin(fixed)}
+    for constant in constants:
+        for rule in (SpectralMemory(constant), ConvectiveMemory(constant)):
+            rules[rule.label] = rule
+    return rules
+
+
+def _run(path: Path, results: dict[str, Any], options) -> None:
+    done = {tuple(case[name] for name in KEY) for case in results["cases"]}
+    rules = _rules(options.constants)
+
+    def make(reynolds):
+        return taylor_green(
+            options.resolution, reynolds, end_time=options.end_time, dtype="float64"
+        )
+
+    for product in options.inner_product:
+        study = Study(
+            make, options.out or Path("out", "memory-length"),
+            product=PRODUCTS[product](), progress=progress,
+        )  # fmt: skip
+        for modes in options.modes:
+            left = [name for name in rules if (product, modes, name) not in done]
+            if not left:
+                tell(f"done before: {product}, M = {modes}")
+                continue
+            study.projections = tuple(rules[name] for name in left)
+            experiment = Experiment((REYNOLDS,), (REYNOLDS,), (modes,))
+            for name, outcome in zip(left, study.run(experiment), strict=True):
+                results["cases"].append(outcome.case.to_dict() | {"rule": name})
+                results["cases"].sort(key=lambda case: (case["inner_product"], case["modes"]))
+                results |= {
+                    "particles": outcome.trajectory.particles,
+                    "parameters": study.scene(REYNOLDS).parameters,
+                    "step": study.scene(REYNOLDS).time_step,
+                    "device": jax.devices()[0].device_kind,
+                    "environment": environment(),
+                }
+                write_json(path, results)
+
+
+def _table(results: dict[str, Any]) -> str:
+    header = ("product", "M", "rule", "tau s", "tau / dt", "velocity %", "median", "pressure %",
+              "median", "reduced s", "stable")  # fmt: skip
+    rows = []
+    for case in results["cases"]:
+        tau = case["tau"]
+        rows.append((
+            case["inner_product"], str(case["modes"]), case["rule"], number(tau),
+            number(None if tau is None else tau / results["step"]),
+            *(number(case[name]) for name in (
+                "velocity_peak_percent", "velocity_median_percent", "pressure_peak_percent",
+                "pressure_median_percent", "rom_seconds")),
+            "yes" if case["stable"] else f"to {number(case['fault_time'])} s",
+        ))  # fmt: skip
+    text = f"discrepancy on the centre line, {results['particles']} particles\n"
+    return text + format_rows(header, rows)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

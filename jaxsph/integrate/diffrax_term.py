@@ -1,0 +1,28 @@
+"""Models of the time loop as terms of diffrax, for its adaptive and implicit solvers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import diffrax
+
+from .model import Model
+
+
+def ode_term(model: Model, auxiliary: Any) -> diffrax.ODETerm:
+    """dy/dt = rates(t, y) of a model, its auxiliary structure held as it is.
+
+        term = ode_term(model, model.prepare(state))
+        solution = diffrax.diffeqsolve(term, diffrax.Tsit5(), t0, t1, dt0, state, ...)
+
+    For a model without auxiliary structure (`TensorModel`) this is the whole model. A neighbour
+    list holds only while no particle has moved by more than half its skin from where it was made:
+    integrate that far at most, ask `model.inspect(step, state, auxiliary)` at the end, and go on
+    from `model.finish(state)` with a term made anew. Solvers try stages beyond their steps, and
+    steps that they reject; a particle may outrun the list there unseen, so leave some of the skin.
+
+    Args:
+        model: full or reduced.
+        auxiliary: `model.prepare(state)` of the state that it starts from.
+    """
+    return diffrax.ODETerm(lambda time, state, _: model.rates(time, state, auxiliary))
