@@ -9,23 +9,12 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import PairTerm, ParticleState, SPHFunctional, VerletList, WallList
-from jaxsph.effects import (
-    Effect,
-    IsotropicViscosity,
-    KickAndHold,
-    LaminarViscosity,
-    ParticleShifting,
-    ShiftingTransport,
-    WallRepulsion,
-    WallTerm,
-)
+from jaxsph.effects import Effect, WallTerm
 from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
 
 from ..field_advection import acts_on_ghosts
-
-# what keeps particles evenly spread has nothing to do on fixed points
-_OF_PARTICLES = (ParticleShifting, ShiftingTransport, WallRepulsion)
+from .fixed_points import changing_force, kept_effects, with_effects, with_viscosity
 
 
 def carried_density(pair, i, j):
@@ -85,22 +74,16 @@ class ReferenceOperators(eqx.Module):
 
         Raises:
             ValueError: if the box is too small for the kernel's support, or a force of the scene
-                changes with time.
+                changes with time during its run.
         """
-        if any(isinstance(e, KickAndHold) for e in scene.effects):
-            raise ValueError(
-                "effects: KickAndHold changes with time, a constant part does not; use "
-                "`ReducedModel` for this scene."
-            )
-        kept = tuple(
-            IsotropicViscosity(e.viscosity) if isinstance(e, LaminarViscosity) else e
-            for e in scene.effects
-            if not isinstance(e, _OF_PARTICLES)
-        )
-        functional = eqx.tree_at(
-            lambda f: f.effects, scene.functional(), kept, is_leaf=lambda x: isinstance(x, tuple)
-        )
         points = jnp.asarray(points, scene.state.position.dtype)
+        force = changing_force(scene, points)
+        if force is not None:
+            raise ValueError(
+                f"effects: {force} changes with time, a constant part does not; use "
+                "`SampledModel` for this scene, or start it where the force is steady."
+            )
+        functional = with_effects(scene.functional(), kept_effects(scene.effects))
         search = scene.search(ParticleState(points, points, points[:, 0]))
         return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))
 
@@ -108,15 +91,7 @@ class ReferenceOperators(eqx.Module):
         self, fields: Float[Array, "points fields"], viscosity: Float[Array, ""]
     ) -> Float[Array, "points fields"]:
         """Rates of (r, u) without advection, linear but for a force and moving walls."""
-        functional = eqx.tree_at(
-            lambda f: f.effects,
-            self.functional,
-            tuple(
-                IsotropicViscosity(viscosity) if isinstance(e, IsotropicViscosity) else e
-                for e in self.functional.effects
-            ),
-            is_leaf=lambda x: isinstance(x, tuple),
-        )
+        functional = with_viscosity(self.functional, viscosity)
 
         def rates(fields):
             found = functional(jnp.zeros((), fields.dtype), self._state(fields), self.neighbors)
@@ -127,12 +102,8 @@ class ReferenceOperators(eqx.Module):
 
     def gradients(self, fields: Float[Array, "points fields"]) -> Float[Array, "points fields dim"]:
         """grad (r, u), affine in the fields where walls move."""
-        functional = eqx.tree_at(
-            lambda f: f.effects,
-            self.functional,
-            (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects)),
-            is_leaf=lambda x: isinstance(x, tuple),
-        )
+        acting = (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects))
+        functional = with_effects(self.functional, acting)
 
         def gradients(fields):
             time = jnp.zeros((), fields.dtype)

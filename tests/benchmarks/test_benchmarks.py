@@ -7,7 +7,14 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom, tensor_stability
+from benchmarks import (
+    convergence,
+    paper_rom,
+    right_hand_side,
+    sampled_rom,
+    tensor_rom,
+    tensor_stability,
+)
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
 from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
@@ -187,3 +194,26 @@ def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
     for row in rows:
         assert row["stable"] and row["highest_energy_over_start"] <= 1.001
     assert "9 of 9 runs stable" in capsys.readouterr().out
+
+
+def test_sampled_models_come_nearer_with_more_samples(tmp_path, capsys):
+    path = tmp_path / "sampled.json"
+    same = ["--resolution", "16", "--end-time", "0.05", "--modes", "2", "--json", str(path)]
+    assert sampled_rom.main([*same, "--samples", "30"]) == 0
+    rows = results(path)["rows"]
+    cases = [(row["selection"], row["wanted"]) for row in rows]
+    assert cases == [
+        ("tensors", None), ("all points", None), ("q-deim", 2), ("non-negative", 2),
+        ("q-deim", 30), ("non-negative", 30),
+    ]  # fmt: skip
+    assert all(row["stable"] and row["rom_seconds"] > 0 for row in rows)
+    everywhere = rows[1]["velocity_peak_percent"]
+    assert rows[1]["samples"] == rows[1]["members"] == 256
+    for row in rows[4:]:
+        assert row["samples"] <= 30 and row["members"] <= 256
+        assert row["velocity_peak_percent"] == pytest.approx(everywhere, rel=0.01)
+    capsys.readouterr()
+    assert sampled_rom.main([*same, "--samples", "30"]) == 0
+    assert "all done before" in capsys.readouterr().err
+    assert results(path)["rows"] == rows
+    assert sampled_rom.main([*same, "--reynolds", "100"]) == 2

@@ -185,5 +185,17 @@ def test_a_run_is_mapped_into_log_density():
 
 def test_a_force_that_changes_with_time_is_refused():
     scene = open_cavity(16)
-    with pytest.raises(ValueError, match="KickAndHold changes with time"):
+    with pytest.raises(ValueError, match="KickAndHold changes with time.*SampledModel"):
         ReferenceOperators.of_scene(scene, scene.state.position)
+
+
+def test_a_force_that_has_settled_is_a_constant_part():
+    scene = open_cavity(16, start_time=5.0)
+    operators = ReferenceOperators.of_scene(scene, scene.state.position)
+    place = np.asarray(scene.state.position)
+    rest = jnp.zeros((len(place), 3)).at[:, 0].set(scene.fluid.reference_density)
+    found = operators.affine(rest, jnp.zeros(()))
+    driven = (np.abs(place[:, 0] - 0.2) < 0.1) & (np.abs(place[:, 1] - 0.05) < 0.02)
+    np.testing.assert_allclose(found[driven, 1], 0.1, rtol=1e-9)  # b0 k0
+    system = galerkin_system(scene, random_basis(scene), place)
+    assert float(jnp.abs(system.constant[0]).max()) > 0.0

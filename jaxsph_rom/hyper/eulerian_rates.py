@@ -1,0 +1,151 @@
+"""The fluid's equations at fixed points as they stand, on all points or on some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+from scipy.spatial import cKDTree
+
+from jaxsph import (
+    Box,
+    NeighborSearch,
+    ParticleState,
+    SPHFunctional,
+    VerletList,
+    WalledSearch,
+    WallList,
+)
+from jaxsph.scenes import Scene
+
+from ..field_advection import FieldAdvection
+from .fixed_points import kept_effects, with_effects, with_viscosity
+from .log_density import from_log_density
+
+
+class EulerianRates(eqx.Module):
+    """f-bar(w, t; nu) of w = (r, u) at fixed points x_G, r the logarithmic density:
+
+        du/dt = f_u - u . grad u,    dr/dt = (rho0 / rho) (f_rho - u . grad rho),
+
+    with f the SPH functional, time and particle volumes m / rho included. Nothing is linearised:
+    any equation of state, any force, walls as the full model has them.
+
+    Args:
+        functional: effects that act on fixed points, and `FieldAdvection`.
+        points: x_G (G, n) [m].
+        neighbors: list of the points.
+    """
+
+    functional: SPHFunctional
+    points: Float[Array, "points dim"]
+    neighbors: VerletList | WallList
+
+    @classmethod
+    def of_scene(cls, scene: Scene, points: Float[Array, "points dim"]) -> EulerianRates:
+        """Rates of a scene; its viscosity is a parameter of the call.
+
+        Raises:
+            ValueError: if the box is too small for the kernel's support.
+        """
+        effects = (*kept_effects(scene.effects), FieldAdvection())
+        functional = with_effects(scene.functional(), effects)
+        return cls._of(functional, jnp.asarray(points, scene.state.position.dtype))
+
+    @classmethod
+    def _of(cls, functional: SPHFunctional, points) -> EulerianRates:
+        space, walls = functional.space, functional.walls
+        box, support = space.box, space.support
+        # fixed points need neither a skin nor a margin
+        if walls is None:
+            search = NeighborSearch.allocate(points, box, support, 0.0, 1.0)
+        else:
+            search = WalledSearch.allocate(
+                points, walls.position, box, support, 0.0, space.spacing, 1.0
+            )
+        return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))
+
+    def __call__(
+        self,
+        time: Float[Array, ""],
+        fields: Float[Array, "points fields"],
+        viscosity: Float[Array, ""],
+    ) -> Float[Array, "points fields"]:
+        """Rates of (r, u)."""
+        fluid = self.functional.fluid
+        density = from_log_density(fields[:, 0], fluid)
+        state = ParticleState(self.points, fields[:, 1:], density)
+        found = with_viscosity(self.functional, viscosity)(time, state, self.neighbors)
+        log_rate = fluid.reference_density / density * found.density
+        return jnp.concatenate([log_rate[:, None], found.velocity], axis=1)
+
+    def around(
+        self, samples: Sequence[int] | Int[np.ndarray, " samples"]
+    ) -> tuple[EulerianRates, Int[np.ndarray, " members"]]:
+        """The same rates on the points and ghosts that those at the samples depend on.
+
+        The second pass reads at a sample's neighbours what the first pass made of theirs, and a
+        ghost takes its values from the fluid around it: so rates at the samples are exact, while
+        those at the other members, which stand at the rim, are not.
+
+        Args:
+            samples: numbers of points, each once.
+
+        Returns:
+            the rates, and the numbers of their points, the samples first.
+
+        Raises:
+            ValueError: if a sample is not a point or stands twice.
+        """
+        samples = np.asarray(samples, int)
+        count = len(self.points)
+        if not len(samples) or len(np.unique(samples)) < len(samples):
+            raise ValueError("samples: give at least one point, and each once.")
+        if samples.min() < 0 or samples.max() >= count:
+            raise ValueError(f"samples: numbers from 0 to {count - 1}, got {samples.max()}.")
+        functional, effects = self.functional, self.functional.effects
+        space, walls = functional.space, functional.walls
+        points = _Cloud(np.asarray(self.points), space.box, space.support)
+        near = points.around(points.positions[samples])
+        first_pass = any(e.geometry_terms(space) for e in effects)
+        members = points.around(points.positions[near]) if first_pass else near
+        if walls is not None:
+            ghosts = _Cloud(np.asarray(walls.position), space.box, space.support)
+            at_walls = any(e.wall_geometry_terms(space) for e in effects)
+            seeing = near if at_walls else samples
+            seen = ghosts.around(points.positions[seeing])
+            members = np.union1d(members, points.around(ghosts.positions[seen]))
+            walls = jax.tree.map(lambda a: a[seen], walls) if len(seen) else None
+            functional = eqx.tree_at(lambda f: f.walls, functional, walls)
+        members = np.concatenate([samples, np.setdiff1d(members, samples)])
+        return self._of(functional, self.points[members]), members
+
+
+class _Cloud:
+    """Points, and which of them are within the kernel's support of others."""
+
+    def __init__(self, positions: np.ndarray, box: Box, support: float):
+        self.positions = positions
+        self._lower = np.asarray(box.lower)
+        self._periodic, self._lengths = np.asarray(box.periodic), np.asarray(box.lengths)
+        self._support = support * (1.0 + 1e-9)
+        # the tree takes a length of 0 as a direction that is closed
+        period = np.where(self._periodic, self._lengths, 0.0)
+        self._tree = cKDTree(self._wrapped(positions), boxsize=period)
+
+    def around(self, places: np.ndarray) -> Int[np.ndarray, " found"]:
+        """Numbers of the points within reach of any of the places, in order."""
+        if not len(places):
+            return np.zeros(0, int)
+        found = self._tree.query_ball_point(self._wrapped(places), self._support)
+        return np.unique(np.concatenate([np.asarray(f, int) for f in found]))
+
+    def _wrapped(self, positions):
+        shifted = positions - self._lower
+        wrapped = np.mod(shifted, self._lengths)
+        wrapped = np.where(wrapped >= self._lengths, 0.0, wrapped)  # mod may round up
+        return np.where(self._periodic, wrapped, shifted)
