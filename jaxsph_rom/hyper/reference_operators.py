@@ -37,6 +37,15 @@ def carried_velocity(pair, i, j):
     return Vector(a * g for a in difference for g in pair.gradient)
 
 
+def check_steady(scene: Scene) -> None:
+    """A ValueError if a force of the scene changes with time."""
+    if any(isinstance(e, KickAndHold) for e in scene.effects):
+        raise ValueError(
+            "effects: KickAndHold changes with time, a constant part does not; use "
+            "`ReducedModel` for this scene."
+        )
+
+
 class CarriedGradients(Effect):
     """Gradients of the fields that the flow carries, at walls with the ghosts' values."""
 
@@ -85,11 +94,7 @@ class ReferenceOperators(eqx.Module):
             ValueError: if the box is too small for the kernel's support, or a force of the scene
                 changes with time.
         """
-        if any(isinstance(e, KickAndHold) for e in scene.effects):
-            raise ValueError(
-                "effects: KickAndHold changes with time, a constant part does not; use "
-                "`ReducedModel` for this scene."
-            )
+        check_steady(scene)
         kept = tuple(
             IsotropicViscosity(e.viscosity) if isinstance(e, LaminarViscosity) else e
             for e in scene.effects
