@@ -209,13 +209,14 @@ def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) 
         fields = flow.fields(coordinates, run.time, line)
         return np.linalg.norm(fields.velocity, axis=2), fields.pressure
 
-    row |= _percent("floor_", truth, profile(jnp.asarray(projected)))
+    row |= discrepancies("floor_", truth, profile(jnp.asarray(projected)))
     if found is not None:
-        row |= _percent("", truth, profile(jnp.concatenate([first[None], found])))
+        row |= discrepancies("", truth, profile(jnp.concatenate([first[None], found])))
     return row
 
 
-def _percent(prefix: str, truth, found) -> dict[str, float]:
+def discrepancies(prefix: str, truth, found) -> dict[str, float]:
+    """Peak and median over time of the discrepancy of velocity norm and pressure."""
     row = {}
     for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
         percent = relative_discrepancy(a, b)

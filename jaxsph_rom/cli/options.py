@@ -16,6 +16,7 @@ from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from jaxsph.scenes import SCENES, Scene
 
 from ..basis import Energy, Euclidean
+from ..hyper.reference_operators import check_steady
 from ..study import PLANS, Plan, quiet
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
@@ -97,7 +98,7 @@ def distinct(values) -> tuple[float, ...]:
 
 
 def scene_maker(
-    options, plan: Plan, reynolds: tuple[float, ...], folder: Path, start_quiet: bool
+    options, plan: Plan, reynolds: tuple[float, ...], folder: Path, on_points: bool
 ) -> Callable[[float], Scene]:
     """The scene as a function of the Reynolds number; bad input is met before the packing.
 
@@ -106,8 +107,9 @@ def scene_maker(
         plan: of the scene.
         reynolds: Reynolds numbers that will be run.
         folder: where runs that settle are kept.
-        start_quiet: whether flows without walls start from stirred particles at a balanced
-            pressure, as models on reference points need it.
+        on_points: whether models on reference points are made of the runs. Flows without walls
+            then start from stirred particles at a balanced pressure, and a force that changes with
+            time is refused.
     """
     make = SCENES[options.scene]
     settings = {
@@ -122,7 +124,9 @@ def scene_maker(
     for number in reynolds:
         cheap = make(reynolds=number, arrangement=ARRANGEMENTS["lattice"](seed=0), **settings)
         plan.probes(cheap)
-    start_quiet = start_quiet and cheap.walls is None
+    if on_points:
+        check_steady(cheap)
+    start_quiet = on_points and cheap.walls is None
     arrangement = options.arrangement or ("stirred" if start_quiet else None)
     if arrangement is not None or options.seed is not None:
         rule = ARRANGEMENTS[arrangement or "packed"]

@@ -39,7 +39,7 @@ def add_to(commands) -> None:
     predict.set_defaults(command=_predict)
     add = predict.add_argument
     add("model", type=Path, metavar="FILE", help="of the model")
-    add("--reynolds", type=_numbers, nargs="+", required=True, metavar="RE",
+    add("--reynolds", type=reynolds_numbers, nargs="+", required=True, metavar="RE",
         help="Reynolds numbers, or START:STOP:COUNT for COUNT of them, evenly spaced")  # fmt: skip
     add("--t-end", type=positive_float, metavar="T",
         help="end time [s] (default: that of the training runs)")  # fmt: skip
@@ -54,7 +54,7 @@ def add_to(commands) -> None:
     add("--json", type=Path, metavar="FILE", help="write what the table says to FILE as well")
 
 
-def _numbers(text: str) -> list[float]:
+def reynolds_numbers(text: str) -> list[float]:
     """A Reynolds number, or a range of them."""
     if ":" not in text:
         return [positive_float(text)]

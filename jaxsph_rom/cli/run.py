@@ -104,10 +104,15 @@ def _run(options) -> int:
 
 def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
     """What runs reduced models: on moving particles, on reference points."""
+    closed = options.closure == "linear"
+    if closed and "tensor" not in options.hyper:
+        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
+    if options.held_back is not None and not closed:
+        raise ValueError("--held-back: without a closure there is nothing to judge; leave it out.")
     if "none" in options.hyper:
         yield study
     if "tensor" in options.hyper:
-        yield TensorStudy(study, options.closure == "linear", options.held_back)
+        yield TensorStudy(study, closed, options.held_back)
 
 
 def _plan(options) -> Plan:
@@ -131,7 +136,7 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         "apg": AdjointPetrovGalerkin(jax.numpy.asarray(plan.tau, options.precision)),
     }
     return Study(
-        scene_maker(options, plan, reynolds, folder, start_quiet="tensor" in options.hyper),
+        scene_maker(options, plan, reynolds, folder, on_points="tensor" in options.hyper),
         folder,
         projections=tuple(projections[name] for name in distinct(options.projection)),
         product=PRODUCTS[options.inner_product](),

@@ -17,7 +17,6 @@ from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
 from ..hyper import LinearClosure, TrainedFlow, save_flow, train_flows
-from ..hyper.reference_operators import check_steady
 from ..hyper.training import held_back
 from ..report.plain import plain
 from ..study import Plan, full_run
@@ -99,9 +98,8 @@ def _plan(options) -> Plan:
 
 def _scenes(options, plan: Plan, folder: Path) -> list[Scene]:
     """The training scenes; a ValueError for what would fail after the full runs."""
-    make = scene_maker(options, plan, plan.train, folder, start_quiet=True)
+    make = scene_maker(options, plan, plan.train, folder, on_points=True)
     scenes = [make(reynolds) for reynolds in plan.train]
-    check_steady(scenes[0])
     available = sum(scene.steps // scene.steps_per_snapshot + 1 for scene in scenes)
     if options.modes > available:
         raise ValueError(
@@ -114,7 +112,7 @@ def _scenes(options, plan: Plan, folder: Path) -> list[Scene]:
 def _closure(options, reynolds) -> LinearClosure | None:
     if options.closure == "none":
         if options.held_back is not None:
-            raise ValueError("--held-back: without a closure there is nothing to judge; leave it.")
+            raise ValueError("--held-back: without a closure there is nothing to judge; leave it out.")
         return None
     judge = held_back(reynolds) if options.held_back is None else options.held_back
     if options.held_back is not None and (judge not in reynolds or len(reynolds) < 2):

@@ -20,6 +20,8 @@ from .reference_operators import ReferenceOperators as ReferenceOperators
 from .sweep import Sweep as Sweep
 from .sweep import sweep as sweep
 from .tensor_model import TensorModel as TensorModel
+from .tracer_model import TracerModel as TracerModel
+from .tracer_model import TracerState as TracerState
 from .trained_flow import TrainedFlow as TrainedFlow
 from .training import LinearClosure as LinearClosure
 from .training import train_flows as train_flows

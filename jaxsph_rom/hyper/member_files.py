@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import jax
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -72,7 +72,7 @@ def write_tracers(
     start = TracerState(
         jnp.asarray(prediction.coordinates[member, 0], dtype), jnp.asarray(positions, dtype)
     )
-    first = jax.jit(model.observe)(start)
+    first = eqx.filter_jit(lambda model, state: model.observe(state))(model, start)
     state = ParticleState(first.position, first.velocity, first.density)
     with _created(path, trained, prediction, member, state) as writer:
         run = simulate(

@@ -61,13 +61,16 @@ class TracerModel(Model):
         return cls(flow.model(viscosity), splines, flow.fluid, space.spacing, walls)
 
     def fields_at(
-        self, position: Float[Array, "particles dim"], coordinates: Float[Array, " modes"]
+        self,
+        position: Float[Array, "particles dim"],
+        coordinates: Float[Array, " modes"],
+        wanted: slice = slice(None),
     ) -> Float[Array, "particles fields"]:
-        """(r, u) at positions; the splines' weights are summed over modes first."""
+        """(r, u) at positions, or those wanted; the splines' weights are summed over modes first."""
         ahead = jnp.append(coordinates, jnp.ones_like(coordinates[:1]))
 
         def summed(weights):
-            return weights.reshape(*weights.shape[:2], -1, ahead.shape[0]) @ ahead
+            return weights.reshape(*weights.shape[:2], -1, ahead.shape[0])[:, :, wanted] @ ahead
 
         weights = (self.splines.node_weights, self.splines.linear_weights)
         of_flow = eqx.tree_at(
@@ -82,7 +85,7 @@ class TracerModel(Model):
         return auxiliary
 
     def rates(self, time, state, auxiliary):
-        velocity = self.fields_at(state.position, state.coordinates)[:, 1:]
+        velocity = self.fields_at(state.position, state.coordinates, slice(1, None))
         return TracerState(self.flow.rates(time, state.coordinates, None), velocity)
 
     def finish(self, state):

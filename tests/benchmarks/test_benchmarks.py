@@ -7,7 +7,14 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom, tensor_stability
+from benchmarks import (
+    convergence,
+    paper_rom,
+    right_hand_side,
+    sweep,
+    tensor_rom,
+    tensor_stability,
+)
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
 from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
@@ -187,3 +194,18 @@ def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
     for row in rows:
         assert row["stable"] and row["highest_energy_over_start"] <= 1.001
     assert "9 of 9 runs stable" in capsys.readouterr().out
+
+
+def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
+    path = tmp_path / "sweep.json"
+    arguments = ["--resolution", "24", "--end-time", "0.05", "--members", "30", "--modes", "2"]
+    arguments += ["--iterations", "20", "--judged", "175", "--json", str(path)]
+    assert sweep.main(arguments) == 0
+    read = results(path)
+    assert read["members"] == read["stable"] == 30
+    assert read["largest_difference_from_single_runs"] < 1e-12  # round-off of four steps
+    assert read["sweep_seconds"]["median"] > 0 and read["single_run_seconds"]["median"] > 0
+    (row,) = read["judged"]
+    assert 0 < row["velocity_median_percent"] < 10 and row["stable"]
+    assert row["floor_velocity_peak_percent"] > 0 and len(read["fom_seconds"]) == 5
+    assert "30 Reynolds numbers, 30 stable" in capsys.readouterr().out

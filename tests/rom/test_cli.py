@@ -54,6 +54,8 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ([*SMALL, "--time-step", "1"], "stability limit"),
         ([*SMALL, "--tau", "x"], "--tau"),
         (["run", "taylor-green", "--scale", "vast"], "vast"),
+        ([*SMALL, "--hyper", "tensor", "--closure", "linear", "--held-back", "120"], "Re 120"),
+        (["run", "open-cavity", "--hyper", "tensor"], "KickAndHold"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
@@ -62,3 +64,21 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and word in error
     assert not out.exists()
+
+
+def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
+    arguments = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--hyper", "none",
+                 "tensor", "--train", "100", "200", "--predict", "150", "--modes", "2",
+                 "--out", str(tmp_path)]  # fmt: skip
+    assert main(arguments) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    moving, fixed = report["cases"]
+    assert (moving["hyper"], fixed["hyper"]) == ("none", "tensor")
+    for case in (moving, fixed):
+        assert case["stable"] and case["projection"] == "galerkin"
+        assert 0 < case["velocity_median_percent"] < 5
+    assert fixed["fom_seconds"] == moving["fom_seconds"]
+    assert 0 < fixed["rom_seconds"] < moving["rom_seconds"]
+    assert report["parameters"]["start"] == "balanced"
+    assert "hyper-reduction tensor" in capsys.readouterr().out
+    assert (tmp_path / "fields_re_150.png").exists()
