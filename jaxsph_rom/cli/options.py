@@ -73,6 +73,12 @@ def check_scene(options) -> None:
         )
 
 
+def check_closure(options) -> None:
+    """A ValueError if a run is held back from no closure."""
+    if options.held_back is not None and options.closure == "none":
+        raise ValueError("--held-back: without a closure there is nothing to judge; leave it out.")
+
+
 def planned(options, needed: tuple[str, ...], given: dict[str, Any]) -> Plan:
     """The scene's plan with what is given on the command line.
 

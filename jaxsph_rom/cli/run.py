@@ -20,6 +20,7 @@ from .options import (
     add_closure_options,
     add_training_options,
     bar,
+    check_closure,
     check_scene,
     defaults,
     distinct,
@@ -107,8 +108,7 @@ def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
     closed = options.closure == "linear"
     if closed and "tensor" not in options.hyper:
         raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
-    if options.held_back is not None and not closed:
-        raise ValueError("--held-back: without a closure there is nothing to judge; leave it out.")
+    check_closure(options)
     if "none" in options.hyper:
         yield study
     if "tensor" in options.hyper:

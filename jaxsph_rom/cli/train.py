@@ -25,6 +25,7 @@ from .options import (
     add_closure_options,
     add_training_options,
     bar,
+    check_closure,
     check_scene,
     distinct,
     planned,
@@ -65,6 +66,7 @@ def _train(options) -> int:
             check_target(target)
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
+        check_closure(options)
         closure = _closure(options, plan.train)
         scenes = _scenes(options, plan, folder)
         try:
@@ -111,8 +113,6 @@ def _scenes(options, plan: Plan, folder: Path) -> list[Scene]:
 
 def _closure(options, reynolds) -> LinearClosure | None:
     if options.closure == "none":
-        if options.held_back is not None:
-            raise ValueError("--held-back: without a closure there is nothing to judge; leave it out.")
         return None
     judge = held_back(reynolds) if options.held_back is None else options.held_back
     if options.held_back is not None and (judge not in reynolds or len(reynolds) < 2):

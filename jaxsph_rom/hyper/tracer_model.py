@@ -66,7 +66,7 @@ class TracerModel(Model):
         coordinates: Float[Array, " modes"],
         wanted: slice = slice(None),
     ) -> Float[Array, "particles fields"]:
-        """(r, u) at positions, or those wanted; the splines' weights are summed over modes first."""
+        """(r, u) at positions, or those wanted of them; weights are summed over modes first."""
         ahead = jnp.append(coordinates, jnp.ones_like(coordinates[:1]))
 
         def summed(weights):
