@@ -26,10 +26,9 @@ from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
-from jaxsph.scenes import Scene, balanced, taylor_green
+from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom.hyper import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
-from jaxsph_rom.study import full_run
-from jaxsph_rom.study.recorded_run import with_record
+from jaxsph_rom.study import full_run, quiet
 
 from .measure import format_rows, number, progress, read_json, summary, tell, write_json
 
@@ -154,7 +153,7 @@ def make_scene(options, reynolds: float) -> Scene:
         arrangement=Stirred(),
         dtype="float64",
     )
-    return with_record(balanced(scene), start="balanced")
+    return quiet(scene)
 
 
 def _closed(flow: ReducedFlow, scene: Scene, projected, iterations: int):
@@ -209,13 +208,14 @@ def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) 
         fields = flow.fields(coordinates, run.time, line)
         return np.linalg.norm(fields.velocity, axis=2), fields.pressure
 
-    row |= _percent("floor_", truth, profile(jnp.asarray(projected)))
+    row |= discrepancies("floor_", truth, profile(jnp.asarray(projected)))
     if found is not None:
-        row |= _percent("", truth, profile(jnp.concatenate([first[None], found])))
+        row |= discrepancies("", truth, profile(jnp.concatenate([first[None], found])))
     return row
 
 
-def _percent(prefix: str, truth, found) -> dict[str, float]:
+def discrepancies(prefix: str, truth, found) -> dict[str, float]:
+    """Peak and median over time of the discrepancy of velocity norm and pressure."""
     row = {}
     for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
         percent = relative_discrepancy(a, b)

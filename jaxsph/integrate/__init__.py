@@ -3,6 +3,7 @@
 from .faults import Fault as Fault
 from .faults import FaultCode as FaultCode
 from .faults import SimulationError as SimulationError
+from .faults import explanation as explanation
 from .loop import integrate as integrate
 from .model import Model as Model
 from .runge_kutta import rk4_step as rk4_step

@@ -19,6 +19,7 @@ class FaultCode(IntEnum):
     NEIGHBORS_OUTDATED = 4
     SPLINE_CELL_OVERFLOW = 5
     BEYOND_WALL = 6
+    ENERGY_OUT_OF_BOUNDS = 7
 
 
 _EXPLANATIONS = {
@@ -34,6 +35,9 @@ _EXPLANATIONS = {
     "allocated: particles have clumped; allocate with a larger margin",
     FaultCode.BEYOND_WALL: "a particle went through a wall; use a smaller time step or a higher "
     "resolution",
+    FaultCode.ENERGY_OUT_OF_BOUNDS: "the flow has more energy than its reference speed allows, so "
+    "the reduced model has left the flows that it knows; use other modes, a closure, or a "
+    "parameter nearer to those trained on",
 }
 
 
@@ -58,6 +62,11 @@ class Fault(eqx.Module):
         return cls(code, jnp.where(code == 0, -1, step).astype(jnp.int32), where)
 
 
+def explanation(code: int) -> str:
+    """What a fault code means and what to do."""
+    return _EXPLANATIONS[FaultCode(code)]
+
+
 class SimulationError(RuntimeError):
     """A run met a fault; names the step, its time and the particle.
 
@@ -72,5 +81,5 @@ class SimulationError(RuntimeError):
         where = f", particle {self.particle}" if self.particle >= 0 else ""
         super().__init__(
             f"step {self.step} (t = {self.step * time_step:.6g} s{where}): "
-            f"{_EXPLANATIONS[self.code]}."
+            f"{explanation(self.code)}."
         )

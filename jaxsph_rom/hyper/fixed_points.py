@@ -51,6 +51,16 @@ def with_viscosity(functional: SPHFunctional, viscosity: Float[Array, ""]) -> SP
     )
 
 
+def check_steady(scene: Scene, points: Float[Array, "points dim"]) -> None:
+    """A ValueError if a force changes with time at the points (G, n) [m] during the scene's run."""
+    force = changing_force(scene, points)
+    if force is not None:
+        raise ValueError(
+            f"effects: {force} changes with time, a constant part does not; use `SampledModel` for "
+            "this scene, or start it where the force is steady."
+        )
+
+
 def changing_force(scene: Scene, points: Float[Array, "points dim"]) -> str | None:
     """The name of a force that changes at the points (G, n) [m] during the scene's run, if any.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -18,6 +19,7 @@ from jaxsph.scenes import Scene
 from ..basis import Basis, Centring, Energy, InnerProduct, pod
 from ..reference import ReferenceSpace
 from ..splines import LocalSplines
+from .energy_bound import EnergyBound
 from .log_density import from_log_density, to_log_density
 from .quadratic_system import QuadraticSystem, galerkin_system
 from .tensor_model import TensorModel
@@ -93,6 +95,15 @@ class ReducedFlow(eqx.Module):
         found = jnp.einsum("gfm,gf...->...m", weighted, jnp.asarray(fields))
         return found - constant.reshape((1,) * (found.ndim - 1) + (-1,))
 
+    @cached_property
+    def bound(self) -> EnergyBound:
+        """The energy that the flow may have."""
+        return EnergyBound.of(self.basis, self.fluid)
+
+    def model(self, viscosity: Float[Array, ""]) -> TensorModel:
+        """The model at a viscosity [m^2/s], for the time loop."""
+        return TensorModel(self.system, viscosity, self.bound)
+
     def predict(
         self,
         coordinates: Float[Array, " modes"],
@@ -104,9 +115,9 @@ class ReducedFlow(eqx.Module):
         """Coordinates after each interval, by the full model's loop.
 
         Raises:
-            SimulationError: if they grow beyond all bounds; it names the step.
+            SimulationError: if they are not finite or leave the bound on energy; it names the step.
         """
-        model = TensorModel(self.system, jnp.asarray(viscosity, coordinates.dtype))
+        model = self.model(jnp.asarray(viscosity, coordinates.dtype))
         step = jnp.asarray(time_step, coordinates.dtype)
         _, fault, found, _ = _integrated(model, coordinates, step, steps_per_snapshot, snapshots)
         if int(fault.code) != 0:

@@ -14,7 +14,7 @@ from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
 
 from ..field_advection import acts_on_ghosts
-from .fixed_points import changing_force, kept_effects, with_effects, with_viscosity
+from .fixed_points import check_steady, kept_effects, with_effects, with_viscosity
 
 
 def carried_density(pair, i, j):
@@ -77,12 +77,7 @@ class ReferenceOperators(eqx.Module):
                 changes with time during its run.
         """
         points = jnp.asarray(points, scene.state.position.dtype)
-        force = changing_force(scene, points)
-        if force is not None:
-            raise ValueError(
-                f"effects: {force} changes with time, a constant part does not; use "
-                "`SampledModel` for this scene, or start it where the force is steady."
-            )
+        check_steady(scene, points)
         functional = with_effects(scene.functional(), kept_effects(scene.effects))
         search = scene.search(ParticleState(points, points, points[:, 0]))
         return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxsph.integrate import Fault, FaultCode, Model
 
+from .energy_bound import EnergyBound
 from .quadratic_system import QuadraticSystem
 
 
@@ -20,10 +21,12 @@ class TensorModel(Model):
     Args:
         system: constant, linear and quadratic part.
         viscosity: nu [m^2/s], a leaf to sweep or to differentiate.
+        bound: on the energy; without one a run is only known to be lost once it is not finite.
     """
 
     system: QuadraticSystem
     viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    bound: EnergyBound | None = None
 
     def prepare(self, state):
         return None
@@ -38,8 +41,10 @@ class TensorModel(Model):
         return state
 
     def inspect(self, step, state, auxiliary):
-        lost = ~jnp.all(jnp.isfinite(state))
-        return Fault.first_of(step, (FaultCode.NOT_FINITE, lost, -1))
+        checks = [(FaultCode.NOT_FINITE, ~jnp.all(jnp.isfinite(state)), -1)]
+        if self.bound is not None:
+            checks.append((FaultCode.ENERGY_OUT_OF_BOUNDS, self.bound.exceeded(state), -1))
+        return Fault.first_of(step, *checks)
 
     def observe(self, state):
         return state

@@ -3,10 +3,12 @@
 from .local_bases import LocalBases as LocalBases
 from .plans import PLANS as PLANS
 from .plans import Plan as Plan
+from .quiet_start import quiet as quiet
 from .recorded_run import full_run as full_run
 from .recorded_run import recorded_run as recorded_run
 from .settled import settled as settled
 from .study import Experiment as Experiment
 from .study import Outcome as Outcome
 from .study import Study as Study
+from .tensor_study import TensorStudy as TensorStudy
 from .write import write_study as write_study

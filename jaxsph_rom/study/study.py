@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -231,35 +232,58 @@ class Study:
         return AdjointPetrovGalerkin(jnp.asarray(float(f"{tau:.4g}"), scene.state.density.dtype))
 
     def _compare(self, experiment, reynolds, basis, projection, tau, memory, run, fault) -> Outcome:
-        scene, full = self.scene(reynolds), self.full(reynolds)
+        scene = self.scene(reynolds)
+        rest = {
+            "modes": basis.size,
+            "projection": projection.name,
+            "tau": tau,
+            "memory": memory,
+            "hyper": "none",
+            "trained_on": tuple(experiment.trained_on),
+            "rom_seconds": _whole_run(run, scene.steps) if fault is None else None,
+            "rom_compile_seconds": run.metadata.get("compile_seconds"),
+        }
         profile = probe(run, self.probes(reynolds), scene.space)
+        return self.judged(reynolds, run, profile, fault, rest)
+
+    def judged(
+        self,
+        reynolds: float,
+        run: Trajectory,
+        profile: tuple[np.ndarray, np.ndarray],
+        fault: SimulationError | None,
+        rest: dict[str, Any],
+    ) -> Outcome:
+        """A reduced run beside its full one.
+
+        Args:
+            reynolds: of the run.
+            run: of the reduced model, as far as it came.
+            profile: its velocity norm and pressure on the probes (S, P).
+            fault: that ended it, if any.
+            rest: values of the `Case` that only its maker knows.
+        """
+        scene, full = self.scene(reynolds), self.full(reynolds)
         truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
         percent = [relative_discrepancy(a, b) for a, b in zip(truth, profile, strict=True)]
         judged = run.time >= min(self.judged_from, run.time[-1])
         case = Case(
             scene=scene.name,
             reynolds=reynolds,
-            modes=basis.size,
-            projection=projection.name,
-            tau=tau,
-            memory=memory,
             inner_product=self._product_name.lower(),
-            hyper="none",
-            trained_on=tuple(experiment.trained_on),
             velocity_peak_percent=float(percent[0][judged].max()),
             velocity_median_percent=float(np.median(percent[0][judged])),
             pressure_peak_percent=float(percent[1][judged].max()),
             pressure_median_percent=float(np.median(percent[1][judged])),
             stable=fault is None,
             fom_seconds=_whole_run(full, scene.steps),
-            rom_seconds=_whole_run(run, scene.steps) if fault is None else None,
             fom_steps=scene.steps,
             rom_steps=scene.steps if fault is None else fault.step,
             fom_compile_seconds=full.metadata["compile_seconds"],
-            rom_compile_seconds=run.metadata.get("compile_seconds"),
-            compression_factor=full.particles * (2 * scene.space.box.dim + 1) / basis.size,
+            compression_factor=full.particles * (2 * scene.space.box.dim + 1) / rest["modes"],
             fault=None if fault is None else str(fault),
             fault_time=None if fault is None else fault.step * scene.time_step,
+            **rest,
         )
         return Outcome(case, run.time, percent[0], percent[1], run, profile)
 

@@ -13,6 +13,7 @@ from jaxsph.scenes import taylor_green_solution as exact
 
 from ..basis import cumulative_energy
 from ..report import (
+    Case,
     Profile,
     centre_line_profiles,
     discrepancy_history,
@@ -119,7 +120,12 @@ def _listed(sigma: np.ndarray) -> dict[str, float]:
 
 def _name(outcome: Outcome) -> str:
     case = outcome.case
-    return f"Re {case.reynolds:g}, {_LABELS[case.projection]}, M = {case.modes}"
+    return f"Re {case.reynolds:g}, {_label(case)}, M = {case.modes}"
+
+
+def _label(case: Case) -> str:
+    label = _LABELS[case.projection]
+    return label if case.hyper == "none" else f"{label} ({case.hyper})"
 
 
 def _by_reynolds(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
@@ -142,7 +148,7 @@ def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float
             if outcome.time[-1] < full.time[k]:
                 continue  # the run failed before
             row = outcome.trajectory.nearest(full.time[k])
-            label = _LABELS[outcome.case.projection]
+            label = _label(outcome.case)
             label += f", M = {outcome.case.modes}" if several else ""
             curves[label] = (outcome.profile[0][row], outcome.profile[1][row])
         if scene.name == "taylor-green":
@@ -163,7 +169,7 @@ def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float
         rows = [_row(f"full, Re {reynolds:g}", full, k)]
         for outcome in group:
             if outcome.time[-1] >= full.time[k]:
-                label = f"{_LABELS[outcome.case.projection]}, M = {outcome.case.modes}"
+                label = f"{_label(outcome.case)}, M = {outcome.case.modes}"
                 row = outcome.trajectory.nearest(full.time[k])
                 rows.append(_row(label, outcome.trajectory, row))
         field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")

@@ -12,6 +12,7 @@ from benchmarks import (
     paper_rom,
     right_hand_side,
     sampled_rom,
+    sweep,
     tensor_rom,
     tensor_stability,
 )
@@ -217,3 +218,18 @@ def test_sampled_models_come_nearer_with_more_samples(tmp_path, capsys):
     assert "all done before" in capsys.readouterr().err
     assert results(path)["rows"] == rows
     assert sampled_rom.main([*same, "--reynolds", "100"]) == 2
+
+
+def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
+    path = tmp_path / "sweep.json"
+    arguments = ["--resolution", "24", "--end-time", "0.05", "--members", "30", "--modes", "2"]
+    arguments += ["--iterations", "20", "--judged", "175", "--json", str(path)]
+    assert sweep.main(arguments) == 0
+    read = results(path)
+    assert read["members"] == read["stable"] == 30
+    assert read["largest_difference_from_single_runs"] < 1e-12  # round-off of four steps
+    assert read["sweep_seconds"]["median"] > 0 and read["single_run_seconds"]["median"] > 0
+    (row,) = read["judged"]
+    assert 0 < row["velocity_median_percent"] < 10 and row["stable"]
+    assert row["floor_velocity_peak_percent"] > 0 and len(read["fom_seconds"]) == 5
+    assert "30 Reynolds numbers, 30 stable" in capsys.readouterr().out

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from jaxsph_rom import ConvectiveMemory, SpectralMemory
-from jaxsph_rom.cli import _parser, main
+from jaxsph_rom.cli import main
+from jaxsph_rom.cli.run import memory_length
 
 SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice"]
 KEYS = {
@@ -56,6 +57,8 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ([*SMALL, "--tau", "x"], "--tau: a time in s, auto or convective, got 'x'"),
         ([*SMALL, "--tau", "-1"], "--tau: a time in s"),
         (["run", "taylor-green", "--scale", "vast"], "vast"),
+        ([*SMALL, "--hyper", "tensor", "--closure", "linear", "--held-back", "120"], "Re 120"),
+        (["run", "open-cavity", "--hyper", "tensor", "--settling", "0.01"], "KickAndHold"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
@@ -67,8 +70,23 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
 
 
 def test_a_memory_length_is_a_time_or_a_rule():
-    def tau(text):
-        return _parser().parse_args(["run", "taylor-green", "--tau", text]).tau
+    assert memory_length("1e-4") == 1e-4 and memory_length("auto") == SpectralMemory()
+    assert memory_length("convective") == ConvectiveMemory()
 
-    assert tau("1e-4") == 1e-4 and tau("auto") == SpectralMemory()
-    assert tau("convective") == ConvectiveMemory()
+
+def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
+    arguments = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--hyper", "none",
+                 "tensor", "--train", "100", "200", "--predict", "150", "--modes", "2",
+                 "--out", str(tmp_path)]  # fmt: skip
+    assert main(arguments) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    moving, fixed = report["cases"]
+    assert (moving["hyper"], fixed["hyper"]) == ("none", "tensor")
+    for case in (moving, fixed):
+        assert case["stable"] and case["projection"] == "galerkin"
+        assert 0 < case["velocity_median_percent"] < 5
+    assert fixed["fom_seconds"] == moving["fom_seconds"]
+    assert 0 < fixed["rom_seconds"] < moving["rom_seconds"]
+    assert report["parameters"]["start"] == "balanced"
+    assert "hyper-reduction tensor" in capsys.readouterr().out
+    assert (tmp_path / "fields_re_150.png").exists()

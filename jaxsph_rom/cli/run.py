@@ -1,0 +1,170 @@
+"""`jaxsph-rom run SCENE`: train, predict, compare with the full model."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import jax
+
+from jaxsph.cli import fail, positive_float, positive_int
+from jaxsph.integrate import SimulationError
+from jaxsph.io import check_target
+
+from ..field_advection import ConsistentAdvection, PaperAdvection
+from ..projection import (
+    AdjointPetrovGalerkin,
+    ConvectiveMemory,
+    Galerkin,
+    MemoryLength,
+    SpectralMemory,
+)
+from ..report import format_table
+from ..study import Outcome, Plan, Study, TensorStudy, write_study
+from .options import (
+    PRODUCTS,
+    add_closure_options,
+    add_training_options,
+    bar,
+    check_closure,
+    check_scene,
+    defaults,
+    distinct,
+    planned,
+    scene_maker,
+)
+
+ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
+PROJECTIONS = ("galerkin", "apg")
+HYPER = ("none", "tensor")
+MEMORIES = {rule.name: rule for rule in (SpectralMemory(), ConvectiveMemory())}
+
+
+def add_to(commands) -> None:
+    """Add the command to a parser's commands."""
+    run = commands.add_parser(
+        "run",
+        help="train, predict, compare with the full model",
+        description="Run full models, build reduced models from them, run these at other Reynolds "
+        "numbers, and compare: a table of errors and times, figures and report.json. Runs are "
+        "kept in the output folder: the same command goes on where it was cut short.",
+    )
+    run.set_defaults(command=_run)
+    add = run.add_argument
+    add_training_options(add)
+    add("--predict", type=positive_float, nargs="+", metavar="RE",
+        help=f"Reynolds numbers to run at ({defaults('predict')})")  # fmt: skip
+    add("--modes", type=positive_int, nargs="+", metavar="M",
+        help=f"numbers of modes ({defaults('modes')})")  # fmt: skip
+    add("--borders", type=positive_float, nargs="+", metavar="RE",
+        help="borders of local bases over Re; two around all of them make one global basis "
+        f"({defaults('borders')}; else a global basis)")  # fmt: skip
+    add("--hyper", choices=HYPER, nargs="+", default=["none"],
+        help="models on moving particles (none), on reference points (tensor), or both; with "
+        "tensor all runs start quietly (default: none)")  # fmt: skip
+    add("--projection", choices=PROJECTIONS, nargs="+", default=["galerkin"],
+        help="Galerkin, adjoint Petrov-Galerkin, or both, on moving particles (default: "
+        "galerkin)")  # fmt: skip
+    add("--tau", type=memory_length, metavar="T",
+        help="memory length of apg [s], or a rule that finds it: 'auto' from the projected "
+        "Jacobian's spectral radius, 'convective' from that of its convective part "
+        f"({defaults('tau')})")  # fmt: skip
+    add("--advection", choices=tuple(ADVECTIONS), default="paper",
+        help="what is subtracted for the Eulerian functional (default: %(default)s)")  # fmt: skip
+    add("--spline-order", type=positive_int, default=3, metavar="K",
+        help="of the polyharmonic splines (default: %(default)s)")  # fmt: skip
+    add_closure_options(add, default="none")
+    add("--slice", type=float, dest="slice_at", metavar="X",
+        help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
+        "0.25)")  # fmt: skip
+    add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
+    add("--json", type=Path, metavar="FILE", help="write the report there, not to DIR/report.json")
+
+
+def memory_length(text: str) -> float | MemoryLength:
+    """A memory length [s], or the rule of that name."""
+    if text in MEMORIES:
+        return MEMORIES[text]
+    try:
+        return positive_float(text)
+    except (ValueError, argparse.ArgumentTypeError):
+        raise argparse.ArgumentTypeError(
+            f"a time in s, {' or '.join(MEMORIES)}, got {text!r}"
+        ) from None
+
+
+def _run(options) -> int:
+    check_scene(options)
+    folder = Path("out", f"rom-{options.scene}") if options.out is None else options.out
+    report = folder / "report.json" if options.json is None else options.json
+    check_target(report)
+    check_target(folder / "report.json")
+    with jax.enable_x64(options.precision == "float64"):
+        plan = _plan(options)
+        experiments = plan.experiments()
+        study = _study(options, plan, folder)
+        models = list(_models(options, study))
+        outcomes: list[Outcome] = []
+        try:
+            for experiment in experiments:
+                for model in models:
+                    model.check(experiment)
+            for model in models:
+                for experiment in experiments:
+                    outcomes += model.run(experiment)
+        except SimulationError as error:
+            return fail("jaxsph-rom", f"full model: {error}", 1)
+        except KeyboardInterrupt:
+            return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
+        write_study(study, experiments, outcomes, folder, report)
+    print(format_table([outcome.case for outcome in outcomes]))
+    if plan.judged_from:
+        print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
+    print(f"\nreport: {report}\nfigures: {folder}/*.png")
+    return 0
+
+
+def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
+    """What runs reduced models: on moving particles, on reference points."""
+    closed = options.closure == "linear"
+    if closed and "tensor" not in options.hyper:
+        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
+    check_closure(options)
+    if "none" in options.hyper:
+        yield study
+    if "tensor" in options.hyper:
+        yield TensorStudy(study, closed, options.held_back)
+
+
+def _plan(options) -> Plan:
+    given = {
+        name: distinct(getattr(options, name))
+        for name in ("train", "predict", "modes", "borders")
+        if getattr(options, name) is not None
+    }
+    for name in ("slice_at", "settling"):
+        if getattr(options, name) is not None:
+            given[name] = getattr(options, name)
+    if {"train", "predict"} & set(given) and "borders" not in given:
+        given["borders"] = None  # the plan's borders belong to its own Reynolds numbers
+    return planned(options, ("train", "predict", "modes"), given)
+
+
+def _study(options, plan: Plan, folder: Path) -> Study:
+    reynolds = (*plan.train, *plan.predict)
+    memory = plan.tau if options.tau is None else options.tau
+    if not isinstance(memory, MemoryLength):
+        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
+    projections = {"galerkin": Galerkin(), "apg": memory}
+    return Study(
+        scene_maker(options, plan, reynolds, folder, on_points="tensor" in options.hyper),
+        folder,
+        projections=tuple(projections[name] for name in distinct(options.projection)),
+        product=PRODUCTS[options.inner_product](),
+        advection=ADVECTIONS[options.advection](),
+        spline_order=options.spline_order,
+        progress=bar,
+        probes=plan.probes,
+        judged_from=plan.judged_from,
+    )

@@ -1,0 +1,178 @@
+"""`jaxsph-rom train SCENE`: full runs in, the file of a reduced model out."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from jaxsph import Trajectory
+from jaxsph.cli import fail, positive_int
+from jaxsph.environment import environment
+from jaxsph.integrate import SimulationError
+from jaxsph.io import check_target
+from jaxsph.scenes import Scene
+
+from ..hyper import LinearClosure, TrainedFlow, save_flow, train_flows
+from ..hyper.training import held_back
+from ..report.plain import plain
+from ..study import Plan, full_run
+from .options import (
+    PRODUCTS,
+    add_closure_options,
+    add_training_options,
+    bar,
+    check_closure,
+    check_scene,
+    distinct,
+    planned,
+    print_rows,
+    scene_maker,
+)
+
+
+def add_to(commands) -> None:
+    """Add the command to a parser's commands."""
+    train = commands.add_parser(
+        "train",
+        help="make a reduced model on reference points, as a file",
+        description="Run full models, make a reduced model on reference points from them, and "
+        "write it to a file from which `jaxsph-rom predict` runs it at any Reynolds number. Full "
+        "runs are kept: the same command goes on where it was cut short.",
+    )
+    train.set_defaults(command=_train)
+    add = train.add_argument
+    add_training_options(add)
+    add("--modes", type=positive_int, default=10, metavar="M",
+        help="number of modes (default: %(default)s)")  # fmt: skip
+    add_closure_options(add, default="linear")
+    add("--closure-iterations", type=positive_int, default=600, metavar="K",
+        help="of the closure's training (default: %(default)s)")  # fmt: skip
+    add("--runs", type=Path, metavar="DIR",
+        help="where full runs are kept (default: out/train-SCENE)")  # fmt: skip
+    add("--out", type=Path, metavar="FILE", help="of the model (default: DIR/model.h5)")
+    add("--json", type=Path, metavar="FILE", help="write what it cost to FILE as well")
+
+
+def _train(options) -> int:
+    check_scene(options)
+    folder = Path("out", f"train-{options.scene}") if options.runs is None else options.runs
+    path = folder / "model.h5" if options.out is None else options.out
+    for target in (path, options.json):
+        if target is not None:
+            check_target(target)
+    with jax.enable_x64(options.precision == "float64"):
+        plan = _plan(options)
+        check_closure(options)
+        closure = _closure(options, plan.train)
+        scenes = _scenes(options, plan, folder)
+        try:
+            runs = [full_run(folder / "full", scene, bar) for scene in scenes]
+        except SimulationError as error:
+            return fail("jaxsph-rom", f"full model: {error}", 1)
+        except KeyboardInterrupt:
+            return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
+        product = PRODUCTS[options.inner_product]()
+        (trained,) = train_flows(scenes, runs, (options.modes,), product, closure, bar)
+        trained = dataclasses.replace(
+            trained,
+            training=trained.training
+            | {"inner_product": options.inner_product, "full_seconds": _seconds(scenes, runs)},
+        )
+        save_flow(path, trained)
+    if options.json is not None:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        results = plain(_results(trained, path))
+        options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
+    _print(trained, runs[0].particles, path)
+    return 0
+
+
+def _plan(options) -> Plan:
+    given: dict[str, Any] = {} if options.train is None else {"train": distinct(options.train)}
+    if options.settling is not None:
+        given["settling"] = options.settling
+    return planned(options, ("train",), given)
+
+
+def _scenes(options, plan: Plan, folder: Path) -> list[Scene]:
+    """The training scenes; a ValueError for what would fail after the full runs."""
+    make = scene_maker(options, plan, plan.train, folder, on_points=True)
+    scenes = [make(reynolds) for reynolds in plan.train]
+    available = sum(scene.steps // scene.steps_per_snapshot + 1 for scene in scenes)
+    if options.modes > available:
+        raise ValueError(
+            f"modes: {options.modes} asked for, but the training runs give {available} snapshots; "
+            "ask for fewer modes, a longer run or more training runs."
+        )
+    return scenes
+
+
+def _closure(options, reynolds) -> LinearClosure | None:
+    if options.closure == "none":
+        return None
+    judge = held_back(reynolds) if options.held_back is None else options.held_back
+    if options.held_back is not None and (judge not in reynolds or len(reynolds) < 2):
+        raise ValueError(
+            f"--held-back: Re {judge:g} must be one of at least two training Reynolds numbers, "
+            f"which are {', '.join(f'{re:g}' for re in reynolds)}."
+        )
+    return LinearClosure(judge, iterations=options.closure_iterations)
+
+
+def _seconds(scenes: list[Scene], runs: list[Trajectory]) -> float:
+    """Run time of all full runs [s], also where a run was taken up again."""
+    return sum(
+        run.metadata["run_seconds"] * scene.steps / run.metadata["steps"]
+        for scene, run in zip(scenes, runs, strict=True)
+    )
+
+
+def _results(trained: TrainedFlow, path: Path) -> dict[str, Any]:
+    return {
+        "scene": trained.scene,
+        "parameters": trained.parameters,
+        "modes": trained.flow.basis.size,
+        "end_time": trained.end_time,
+        **trained.training,
+        "model": path,
+    }
+
+
+def _print(trained: TrainedFlow, particles: int, path: Path) -> None:
+    made = trained.training
+    closure = made["closure"]
+    if closure != "none":
+        judge = made["held_back"]
+        closure += f", {made['closure_seconds']:.3g} s"
+        closure += "" if judge is None else f", Re {judge:g} held back"
+    print_rows({
+        "scene": f"{trained.scene}, {particles} particles, to t = {trained.end_time:g} s",
+        "trained on": "Re " + " ".join(f"{reynolds:g}" for reynolds in trained.reynolds),
+        "modes": f"{trained.flow.basis.size}, {made['inner_product']} inner product",
+        "full runs": f"{made['full_seconds']:.3g} s",
+        "offline": f"{made['offline_seconds']:.3g} s (map, decompose, project)",
+        "closure": closure,
+        "model": str(path),
+    })  # fmt: skip
+    print_errors(made)
+
+
+def print_errors(training: dict[str, Any]) -> None:
+    """What a model gets wrong on the runs that it was trained on."""
+    print("\npercent discrepancy over the reference points on the training runs, peak and median\n"
+          "over time (in brackets that of the projection, the floor of any model):")  # fmt: skip
+    for number, error in training["errors"].items():
+        if isinstance(error, str):
+            print(f"  Re {number}: {error}")
+            continue
+        floor = training["floor"][number]
+        cells = [
+            f"{name} {error[f'{name}_peak_percent']:.3g} ({floor[f'{name}_peak_percent']:.3g}), "
+            f"{error[f'{name}_median_percent']:.3g} ({floor[f'{name}_median_percent']:.3g})"
+            for name in ("velocity", "pressure")
+        ]
+        print(f"  Re {number}: {'; '.join(cells)}")

@@ -1,0 +1,111 @@
+"""A reduced flow at many viscosities at once."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from jaxsph.integrate import integrate
+
+from .reduced_flow import ReducedFlow
+from .tensor_model import TensorModel
+
+BATCH = 500  # members; what a step touches then stays in cache
+
+
+class Sweep(NamedTuple):
+    """Runs of one flow, a member each.
+
+    Args:
+        coordinates: after each interval (K, S, M); NaN from a member's fault on.
+        code: of the fault, a `FaultCode` (K,); 0 if there was none.
+        step: that met it (K,); -1 if there was none.
+        run_seconds, compile_seconds: wall-clock time [s].
+    """
+
+    coordinates: Float[np.ndarray, "members snapshots modes"]
+    code: Int[np.ndarray, " members"]
+    step: Int[np.ndarray, " members"]
+    run_seconds: float
+    compile_seconds: float
+
+
+def sweep(
+    flow: ReducedFlow,
+    starts: Float[Array, "members modes"],
+    viscosities: Float[Array, " members"],
+    time_step: float,
+    steps_per_snapshot: int,
+    snapshots: int,
+    *,
+    batch: int = BATCH,
+    progress: Callable[[int], None] | None = None,
+) -> Sweep:
+    """Run a flow from each start at its viscosity by `jax.vmap` of the time loop.
+
+    A member that meets a fault stops alone. The first batch runs twice, once to compile.
+
+    Args:
+        flow: to run.
+        starts: coordinates at the start.
+        viscosities: nu [m^2/s].
+        time_step: dt [s].
+        steps_per_snapshot: between snapshots.
+        snapshots: number of intervals.
+        batch: members run at a time.
+        progress: is called with the number of members done since its last call.
+
+    Raises:
+        ValueError: if there is no member, or there are not as many starts as viscosities.
+    """
+    dtype = flow.system.linear.dtype
+    starts, viscosities = (np.asarray(a, dtype) for a in (starts, viscosities))
+    count = len(viscosities)
+    if count == 0 or starts.shape != (count, flow.system.size):
+        raise ValueError(
+            f"starts: {starts.shape} for {count} viscosities and {flow.system.size} modes; give "
+            "one start for each viscosity, and at least one."
+        )
+    size = min(batch, count)
+    bound, step = flow.bound, jnp.asarray(time_step, dtype)
+    coordinates = np.empty((count, snapshots, flow.system.size), dtype)
+    faults = np.empty((2, count), np.int32)
+    seconds, first = [], None
+    for begin in range(0, count, size):
+        # the last batch is filled up from the members before it
+        rows = slice(max(0, min(begin, count - size)), min(begin + size, count))
+        arguments = (
+            flow.system, bound, jnp.asarray(starts[rows]), jnp.asarray(viscosities[rows]), step,
+            steps_per_snapshot, snapshots,
+        )  # fmt: skip
+        if first is None:
+            before = clock.perf_counter()
+            jax.block_until_ready(_batch(*arguments))
+            first = clock.perf_counter() - before
+        before = clock.perf_counter()
+        found, code, at = jax.block_until_ready(_batch(*arguments))
+        seconds.append(clock.perf_counter() - before)
+        coordinates[rows], faults[:, rows] = found, (code, at)
+        if progress is not None:
+            progress(rows.stop - begin)
+    return Sweep(coordinates, *faults, sum(seconds), max(0.0, first - seconds[0]))
+
+
+@eqx.filter_jit
+def _batch(system, bound, starts, viscosities, time_step, steps_per_snapshot, snapshots):
+    def member(start, viscosity):
+        model = TensorModel(system, viscosity, bound)
+        first = jnp.zeros((), jnp.int32)
+        _, fault, found, good = integrate(
+            model, start, first, time_step, steps_per_snapshot, snapshots
+        )
+        return jnp.where(good[:, None], found, jnp.nan), fault.code, fault.step
+
+    return jax.vmap(member)(starts, viscosities)

@@ -1,0 +1,121 @@
+"""Particles that a reduced flow carries along."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxsph import Fluid, Snapshot
+from jaxsph.full_model import wall_checks
+from jaxsph.integrate import Fault, FaultCode, Model
+from jaxsph.walls import Walls
+
+from ..splines import LocalSplines
+from .log_density import from_log_density
+from .reduced_flow import ReducedFlow
+from .tensor_model import TensorModel
+
+_MARGIN = 2.0  # tracers are not kept apart: cells need more room than those of a full model
+_WALL_MARGIN = 0.25  # times dx: none comes nearer to a wall
+
+
+class TracerState(eqx.Module):
+    """Reduced coordinates (M,) and positions of tracers (N, n) [m]; also their rates."""
+
+    coordinates: Float[Array, " modes"]
+    position: Float[Array, "particles dim"]
+
+
+class TracerModel(Model):
+    """A reduced flow and tracers in it:
+
+        da/dt = f(a, nu),    dx/dt = u(x) = centre(x) + sum_m a_m phi_m(x),
+
+    the modes between the reference points by local splines. Tracers do not act on the flow. As
+    modes do not keep them inside walls, those that come too near are put back after each step.
+
+    Args:
+        flow: the model of the coordinates.
+        splines: of the modes and the centre, functions ordered (field, mode), the centre last.
+        fluid: gives densities their scale.
+        spacing: of the reference points [m].
+        walls: around the fluid, if it has any.
+    """
+
+    flow: TensorModel
+    splines: LocalSplines
+    fluid: Fluid
+    spacing: float = eqx.field(static=True)
+    walls: Walls | None = None
+
+    @classmethod
+    def of(cls, flow: ReducedFlow, viscosity: Array, walls: Walls | None = None) -> TracerModel:
+        """The model of tracers in a flow at a viscosity [m^2/s]."""
+        modes = np.asarray(flow.basis.modes)
+        centre = np.broadcast_to(np.asarray(flow.basis.centre), modes.shape[:2])
+        values = np.concatenate([modes, centre[..., None]], axis=2).astype(modes.dtype)
+        points, space = np.asarray(flow.reference.points), flow.reference.space
+        splines = LocalSplines.fit(points, values.reshape(len(points), -1), space, margin=_MARGIN)
+        return cls(flow.model(viscosity), splines, flow.fluid, space.spacing, walls)
+
+    def fields_at(
+        self,
+        position: Float[Array, "particles dim"],
+        coordinates: Float[Array, " modes"],
+        wanted: slice = slice(None),
+    ) -> Float[Array, "particles fields"]:
+        """(r, u) at positions, or those wanted of them; weights are summed over modes first."""
+        ahead = jnp.append(coordinates, jnp.ones_like(coordinates[:1]))
+
+        def summed(weights):
+            return weights.reshape(*weights.shape[:2], -1, ahead.shape[0])[:, :, wanted] @ ahead
+
+        weights = (self.splines.node_weights, self.splines.linear_weights)
+        of_flow = eqx.tree_at(
+            lambda s: (s.node_weights, s.linear_weights), self.splines, tuple(map(summed, weights))
+        )
+        return of_flow(position)
+
+    def prepare(self, state):
+        return None
+
+    def refresh(self, auxiliary, state, time_step):
+        return auxiliary
+
+    def rates(self, time, state, auxiliary):
+        velocity = self.fields_at(state.position, state.coordinates, slice(1, None))
+        return TracerState(self.flow.rates(time, state.coordinates, None), velocity)
+
+    def finish(self, state):
+        position = self.splines.grid.box.wrap(state.position)
+        if self.walls is not None:
+            position = self.walls.put_inside(position, _WALL_MARGIN * self.spacing)
+        return TracerState(state.coordinates, position)
+
+    def inspect(self, step, state, auxiliary):
+        of_flow = self.flow.inspect(step, state.coordinates, None)
+        wild = ~jnp.isfinite(jnp.sum(state.position, axis=1))
+        of_tracers = Fault.first_of(
+            step,
+            (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
+            *wall_checks(self.walls, state.position),
+            (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(state.position), -1),
+        )
+        lost = of_flow.code != int(FaultCode.NONE)
+        return Fault(*(
+            jnp.where(lost, getattr(of_flow, name), getattr(of_tracers, name))
+            for name in ("code", "step", "particle")
+        ))  # fmt: skip
+
+    def observe(self, state):
+        fields = self.fields_at(state.position, state.coordinates)
+        density = from_log_density(fields[:, 0], self.fluid)
+        return Snapshot(
+            position=state.position,
+            velocity=fields[:, 1:],
+            density=density,
+            pressure=self.fluid.pressure(density),
+            coordinates=state.coordinates,
+        )

@@ -1,0 +1,152 @@
+"""`jaxsph-rom train` and `predict`: a model as a file, and one clear line for bad input."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from jaxsph.io import read_trajectory
+from jaxsph_rom.cli import main
+from jaxsph_rom.hyper import load_flow, load_prediction
+
+TRAIN = ["train", "taylor-green", "--resolution", "24", "--t-end", "0.05", "--modes", "2"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A model of four runs of four snapshots each."""
+    folder = tmp_path_factory.mktemp("train")
+    arguments = [*TRAIN, "--train", "100", "150", "200", "250", "--closure-iterations", "20"]
+    arguments += ["--runs", str(folder), "--out", str(folder / "model.h5")]
+    assert main([*arguments, "--json", str(folder / "train.json")]) == 0
+    return folder
+
+
+def predict(folder, *arguments):
+    return main(["predict", str(folder / "model.h5"), *arguments])
+
+
+def test_what_a_model_cost_and_gets_wrong(folder):
+    read = json.loads((folder / "train.json").read_text())
+    assert read["trained_on"] == [100.0, 150.0, 200.0, 250.0] and read["held_back"] == 200.0
+    assert read["closure"] == "linear" and read["modes"] == 2
+    for name in ("full_seconds", "offline_seconds", "closure_seconds"):
+        assert read[name] > 0
+    for number in ("100", "150", "200", "250"):
+        floor, error = read["floor"][number], read["errors"][number]
+        for name in ("velocity_median_percent", "pressure_median_percent"):
+            assert 0 < 0.5 * floor[name] <= error[name] < 5
+    assert read["parameters"]["start"] == "balanced"
+    assert read["parameters"]["arrangement"]["rule"] == "Stirred"
+    trained = load_flow(folder / "model.h5")
+    np.testing.assert_allclose(trained.reynolds, [100.0, 150.0, 200.0, 250.0])
+    assert trained.end_time == pytest.approx(0.05) and trained.scene == "taylor-green"
+
+
+def test_a_sweep_from_one_line(folder, tmp_path, capsys):
+    results = tmp_path / "p.json"
+    assert predict(folder, "--reynolds", "110", "100:250:7", "--out", str(tmp_path),
+                   "--json", str(results)) == 0  # fmt: skip
+    captured = capsys.readouterr()
+    assert "stable                 8 of 8" in captured.out and "warning" not in captured.err
+    assert "Re 200: velocity" in captured.out  # never a time without an error
+    read = json.loads(results.read_text())
+    assert read["stable"] == read["reynolds_numbers"] == 8 and read["run_seconds"] > 0
+    found, trained = load_prediction(tmp_path / "prediction.h5"), load_flow(folder / "model.h5")
+    np.testing.assert_allclose(found.reynolds, [110, 100, 125, 150, 175, 200, 225, 250])
+    assert found.coordinates.shape == (8, trained.snapshots + 1, 2)
+    np.testing.assert_array_equal(found.status, 0)
+    # a vortex decays the faster, the lower its Reynolds number
+    kept = np.sum(found.coordinates[1:, -1] ** 2, axis=1) / np.sum(
+        found.coordinates[1:, 0] ** 2, axis=1
+    )
+    assert (np.diff(kept) > 0).all() and (kept < 1).all()
+    exact = np.exp(-16 * np.pi**2 / found.reynolds[1:] * found.time[-1])
+    np.testing.assert_allclose(np.log(kept), np.log(exact), rtol=0.1)  # 24 x 24 particles
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["p.json", "prediction.h5"]
+
+
+def test_fields_and_tracers_as_trajectories(folder, tmp_path, capsys):
+    assert predict(folder, "--reynolds", "300", "--t-end", "0.1", "--fields", "--tracers", "30",
+                   "--out", str(tmp_path)) == 0  # fmt: skip
+    warned = capsys.readouterr().err
+    assert "1 of 1 Reynolds numbers are outside" in warned and "beyond the training" in warned
+    fields = read_trajectory(tmp_path / "fields" / "re-300.h5")
+    tracers = read_trajectory(tmp_path / "tracers" / "re-300.h5")
+    assert fields.particles == 576 and tracers.particles == 30
+    np.testing.assert_array_equal(fields.time, tracers.time)
+    np.testing.assert_allclose(fields.coordinates, tracers.coordinates, rtol=0, atol=1e-12)
+    # tracers start on reference points and move at the velocity of the fields there
+    apart = np.abs(fields.position[0][:, None] - tracers.position[0][None]).sum(axis=2)
+    at = apart.argmin(axis=0)
+    np.testing.assert_allclose(apart.min(axis=0), 0.0, atol=1e-15)
+    np.testing.assert_allclose(tracers.velocity[0], fields.velocity[0][at], atol=1e-9)
+    np.testing.assert_allclose(tracers.pressure[0], fields.pressure[0][at], atol=1e-6)
+    moved = (tracers.position[1] - tracers.position[0] + 0.5) % 1.0 - 0.5
+    wanted = tracers.velocity[0] * (tracers.time[1] - tracers.time[0])
+    np.testing.assert_allclose(moved, wanted, atol=0.02 * np.abs(wanted).max())
+    assert tracers.metadata["tracers"]
+
+
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["--reynolds", "0"], "--reynolds"),
+        (["--reynolds", "100:250"], "START:STOP:COUNT"),
+        (["--reynolds", "250:100:5"], "START below STOP"),
+        (["--reynolds", "100:250:1000000"], "at most 100000"),
+        (["--reynolds", "100:250:101", "--fields"], "at most 100"),
+        (["--reynolds", "100:250:101", "--tracers", "5"], "at most 100"),
+        (["--reynolds", "100:250:60000", "--t-end", "500"], "GiB"),
+        (["--reynolds", "100", "--t-end", "0.051"], "snapshot intervals"),
+        ([], "--reynolds"),
+    ],
+)
+def test_bad_predictions_are_one_line_and_code_2(folder, tmp_path, capsys, arguments, word):
+    out = tmp_path / "out"
+    assert predict(folder, *arguments, "--out", str(out)) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and word in error
+    assert not out.exists()
+
+
+def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
+    path, out = tmp_path / "model.h5", tmp_path / "out"
+    content = (folder / "model.h5").read_bytes()
+
+    def refused(word):
+        assert main(["predict", str(path), "--reynolds", "100", "--out", str(out)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and word in error and not out.exists()
+
+    refused("cannot be read")
+    path.write_bytes(content[: len(content) // 2])
+    refused("truncated or damaged")
+    path.write_bytes((folder / "full" / "re-100" / "trajectory.h5").read_bytes())
+    refused("holds no reduced flow")
+    path.write_bytes(content)
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema_version"] = 2
+    refused("schema version 2")
+
+
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["train", "no-such-scene"], "no-such-scene"),
+        (["train", "couette"], "--train"),
+        (["train", "open-cavity", "--resolution", "32", "--settling", "0.01"], "KickAndHold"),
+        ([*TRAIN, "--modes", "500"], "500 asked for"),
+        ([*TRAIN, "--held-back", "120"], "Re 120"),
+        ([*TRAIN, "--closure", "none", "--held-back", "150"], "nothing to judge"),
+        ([*TRAIN, "--time-step", "1"], "stability limit"),
+        ([*TRAIN, "--closure", "cubic"], "cubic"),
+    ],
+)
+def test_bad_training_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
+    out = tmp_path / "out"
+    assert main([*arguments, "--runs", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert word in error and "error:" in error.splitlines()[-1]
+    assert not (out / "model.h5").exists() and not (out / "full").exists()
