@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
@@ -59,6 +60,19 @@ class Basis(eqx.Module):
         if len(self.centre) == 1:
             return functions, self.centre
         return functions[:, :, :-1], functions[:, :, -1]
+
+    def combination(
+        self, coordinates: Float[Array, " modes"]
+    ) -> tuple[Float[Array, "functions fields"], Float[Array, "1 fields"]]:
+        """Two matrices: fields = functions @ first + second, functions being (field, function)."""
+        count = self.modes.shape[1]
+        each = jnp.eye(count, dtype=coordinates.dtype)
+        if len(self.centre) == 1:
+            ahead, rest = coordinates, jnp.asarray(self.centre, coordinates.dtype)
+        else:
+            ahead = jnp.append(coordinates, jnp.ones_like(coordinates[:1]))
+            rest = jnp.zeros((1, count), coordinates.dtype)
+        return jnp.einsum("fg,m->fmg", each, ahead).reshape(-1, count), rest
 
 
 def pod(

@@ -16,11 +16,13 @@ from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from jaxsph.scenes import SCENES, Scene
 
 from ..basis import Energy, Euclidean
+from ..hyper import Compressible, Formulation, Solenoidal
 from ..hyper.fixed_points import check_steady
 from ..study import PLANS, Plan, quiet
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 CLOSURES = ("none", "linear")
+FORMULATIONS = ("compressible", "solenoidal")
 
 
 def add_training_options(add) -> None:
@@ -46,7 +48,10 @@ def add_training_options(add) -> None:
 
 
 def add_closure_options(add, default: str) -> None:
-    """How models on reference points are closed."""
+    """How models on reference points are formulated and closed."""
+    add("--formulation", choices=FORMULATIONS,
+        help="of models on reference points: the compressible equations as they are, or solenoidal "
+        "modes with the pressure recovered (default: solenoidal between walls)")  # fmt: skip
     add("--closure", choices=CLOSURES, default=default,
         help="of models on reference points (default: %(default)s)")  # fmt: skip
     add("--held-back", type=positive_float, metavar="RE",
@@ -71,6 +76,15 @@ def check_scene(options) -> None:
         raise ValueError(
             f"scene {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
         )
+
+
+def formulation(options) -> Formulation | None:
+    """The formulation asked for, if one is."""
+    if options.formulation == "solenoidal":
+        return Solenoidal()
+    if options.formulation == "compressible":
+        return Compressible(PRODUCTS[options.inner_product]())
+    return None
 
 
 def check_closure(options) -> None:

@@ -31,6 +31,7 @@ from .options import (
     check_scene,
     defaults,
     distinct,
+    formulation,
     planned,
     scene_maker,
 )
@@ -134,7 +135,7 @@ def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
     if "none" in options.hyper:
         yield study
     if "tensor" in options.hyper:
-        yield TensorStudy(study, closed, options.held_back)
+        yield TensorStudy(study, formulation(options), closed, options.held_back)
 
 
 def _plan(options) -> Plan:

@@ -16,7 +16,7 @@ from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
-from ..hyper import LinearClosure, TrainedFlow, save_flow, train_flows
+from ..hyper import LinearClosure, TrainedFlow, formulation_for, save_flow, train_flows
 from ..hyper.training import held_back
 from ..report.plain import plain
 from ..study import Plan, full_run
@@ -28,6 +28,7 @@ from .options import (
     check_closure,
     check_scene,
     distinct,
+    formulation,
     planned,
     print_rows,
     scene_maker,
@@ -75,8 +76,10 @@ def _train(options) -> int:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
-        product = PRODUCTS[options.inner_product]()
-        (trained,) = train_flows(scenes, runs, (options.modes,), product, closure, bar)
+        made_as = formulation(options)
+        if made_as is None:
+            made_as = formulation_for(scenes[0], PRODUCTS[options.inner_product]())
+        (trained,) = train_flows(scenes, runs, (options.modes,), made_as, closure, bar)
         trained = dataclasses.replace(
             trained,
             training=trained.training
@@ -152,7 +155,8 @@ def _print(trained: TrainedFlow, particles: int, path: Path) -> None:
     print_rows({
         "scene": f"{trained.scene}, {particles} particles, to t = {trained.end_time:g} s",
         "trained on": "Re " + " ".join(f"{reynolds:g}" for reynolds in trained.reynolds),
-        "modes": f"{trained.flow.basis.size}, {made['inner_product']} inner product",
+        "modes": f"{trained.flow.basis.size}, {made['inner_product']} inner product, "
+        f"{made['formulation']}",
         "full runs": f"{made['full_seconds']:.3g} s",
         "offline": f"{made['offline_seconds']:.3g} s (map, decompose, project)",
         "closure": closure,

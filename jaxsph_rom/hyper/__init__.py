@@ -8,6 +8,10 @@ from .energy_bound import EnergyBound as EnergyBound
 from .eulerian_rates import EulerianRates as EulerianRates
 from .flow_file import load_flow as load_flow
 from .flow_file import save_flow as save_flow
+from .formulation import Compressible as Compressible
+from .formulation import Formulation as Formulation
+from .formulation import Solenoidal as Solenoidal
+from .formulation import formulation_for as formulation_for
 from .log_density import from_log_density as from_log_density
 from .log_density import to_log_density as to_log_density
 from .prediction import Prediction as Prediction
@@ -17,6 +21,8 @@ from .quadratic_system import QuadraticSystem as QuadraticSystem
 from .quadratic_system import galerkin_system as galerkin_system
 from .rate_snapshots import VisitedStates as VisitedStates
 from .rate_snapshots import rate_basis as rate_basis
+from .recovery import Recovery as Recovery
+from .recovery import fit_recovery as fit_recovery
 from .reduced_flow import ReducedFlow as ReducedFlow
 from .reduced_flow import mapped_run as mapped_run
 from .reference_operators import ReferenceOperators as ReferenceOperators
@@ -25,6 +31,9 @@ from .sampling import QDEIM as QDEIM
 from .sampling import NonNegativeWeights as NonNegativeWeights
 from .sampling import Samples as Samples
 from .sampling import Sampling as Sampling
+from .solenoidal import divergence_matrix as divergence_matrix
+from .solenoidal import solenoidal_basis as solenoidal_basis
+from .solenoidal import without_divergence as without_divergence
 from .sweep import Sweep as Sweep
 from .sweep import sweep as sweep
 from .tensor_model import TensorModel as TensorModel

@@ -9,10 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
-from scipy.spatial import cKDTree
 
 from jaxsph import (
-    Box,
     NeighborSearch,
     ParticleState,
     SPHFunctional,
@@ -23,6 +21,7 @@ from jaxsph import (
 from jaxsph.scenes import Scene
 
 from ..field_advection import FieldAdvection
+from .cloud import Cloud
 from .fixed_points import kept_effects, with_effects, with_viscosity
 from .log_density import from_log_density
 
@@ -109,43 +108,18 @@ class EulerianRates(eqx.Module):
             raise ValueError(f"samples: numbers from 0 to {count - 1}, got {samples.max()}.")
         functional, effects = self.functional, self.functional.effects
         space, walls = functional.space, functional.walls
-        points = _Cloud(np.asarray(self.points), space.box, space.support)
-        near = points.around(points.positions[samples])
+        reach = space.support * (1.0 + 1e-9)
+        points = Cloud(np.asarray(self.points), space.box)
+        near = points.around(points.positions[samples], reach)
         first_pass = any(e.geometry_terms(space) for e in effects)
-        members = points.around(points.positions[near]) if first_pass else near
+        members = points.around(points.positions[near], reach) if first_pass else near
         if walls is not None:
-            ghosts = _Cloud(np.asarray(walls.position), space.box, space.support)
+            ghosts = Cloud(np.asarray(walls.position), space.box)
             at_walls = any(e.wall_geometry_terms(space) for e in effects)
             seeing = near if at_walls else samples
-            seen = ghosts.around(points.positions[seeing])
-            members = np.union1d(members, points.around(ghosts.positions[seen]))
+            seen = ghosts.around(points.positions[seeing], reach)
+            members = np.union1d(members, points.around(ghosts.positions[seen], reach))
             walls = jax.tree.map(lambda a: a[seen], walls) if len(seen) else None
             functional = eqx.tree_at(lambda f: f.walls, functional, walls)
         members = np.concatenate([samples, np.setdiff1d(members, samples)])
         return self._of(functional, self.points[members]), members
-
-
-class _Cloud:
-    """Points, and which of them are within the kernel's support of others."""
-
-    def __init__(self, positions: np.ndarray, box: Box, support: float):
-        self.positions = positions
-        self._lower = np.asarray(box.lower)
-        self._periodic, self._lengths = np.asarray(box.periodic), np.asarray(box.lengths)
-        self._support = support * (1.0 + 1e-9)
-        # the tree takes a length of 0 as a direction that is closed
-        period = np.where(self._periodic, self._lengths, 0.0)
-        self._tree = cKDTree(self._wrapped(positions), boxsize=period)
-
-    def around(self, places: np.ndarray) -> Int[np.ndarray, " found"]:
-        """Numbers of the points within reach of any of the places, in order."""
-        if not len(places):
-            return np.zeros(0, int)
-        found = self._tree.query_ball_point(self._wrapped(places), self._support)
-        return np.unique(np.concatenate([np.asarray(f, int) for f in found]))
-
-    def _wrapped(self, positions):
-        shifted = positions - self._lower
-        wrapped = np.mod(shifted, self._lengths)
-        wrapped = np.where(wrapped >= self._lengths, 0.0, wrapped)  # mod may round up
-        return np.where(self._periodic, wrapped, shifted)

@@ -14,6 +14,7 @@ from jaxsph import Box, Fluid, Space, interpolation, kernels
 from ..basis import Basis
 from ..reference import ReferenceSpace
 from .quadratic_system import QuadraticSystem
+from .recovery import Recovery
 from .reduced_flow import ReducedFlow
 from .trained_flow import TrainedFlow
 from .whole_file import read_whole, write_whole
@@ -32,9 +33,17 @@ _LAYOUT = {
     "quadratic": ("modes modes modes", "1/s per unit coordinate"),
     "viscosities": ("runs", "m^2/s"),
     "starts": ("runs modes", "coordinate"),
+    # without a recovery these have no entries
+    "recovered_velocity": ("recovered dim coordinates", "m/s per unit coordinate"),
+    "recovered_mean": ("recovered", "kg/m^3"),
+    "recovered_modes": ("recovered density_modes", "kg/m^3 per unit coordinate"),
+    "recovered_constant": ("density_modes", "coordinate"),
+    "recovered_linear": ("density_modes coordinates", "coordinate per unit coordinate"),
+    "recovered_quadratic": ("density_modes coordinates coordinates", "coordinate per unit squared"),
 }
 _BASIS = ("modes", "centre", "weights", "singular_values")
 _SYSTEM = ("constant", "linear", "quadratic")
+_RECOVERY = ("velocity", "mean", "modes", "constant", "linear", "quadratic")
 
 
 def save_flow(path: str | os.PathLike, trained: TrainedFlow) -> None:
@@ -71,8 +80,20 @@ def save_flow(path: str | os.PathLike, trained: TrainedFlow) -> None:
         **{name: getattr(flow.system, name) for name in _SYSTEM},
         "viscosities": trained.viscosities,
         "starts": trained.starts,
+        **_recovered(flow),
     }
     write_whole(path, (FORMAT, SCHEMA_VERSION), _LAYOUT, arrays, attributes)
+
+
+def _recovered(flow: ReducedFlow) -> dict[str, np.ndarray]:
+    if flow.recovery is not None:
+        return {f"recovered_{name}": getattr(flow.recovery, name) for name in _RECOVERY}
+    length = {"dim": flow.reference.points.shape[1]}
+    return {
+        name: np.zeros([length.get(axis, 0) for axis in axes.split()])
+        for name, (axes, _) in _LAYOUT.items()
+        if name.startswith("recovered_")
+    }
 
 
 def load_flow(path: str | os.PathLike) -> TrainedFlow:
@@ -91,6 +112,11 @@ def _assembled(
     whole = sizes["places"] in (1, sizes["points"])
     if sizes["fields"] != sizes["dim"] + 1 or sizes["two"] != 2 or not whole:
         raise ValueError("fields")
+    recovery = None
+    if sizes["recovered"]:
+        if (sizes["recovered"], sizes["coordinates"]) != (sizes["points"], sizes["modes"]):
+            raise ValueError("recovered")
+        recovery = Recovery(*(jnp.asarray(arrays[f"recovered_{name}"]) for name in _RECOVERY))
     box = Box(
         *(tuple(map(float, attributes[f"box_{name}"])) for name in ("lower", "upper")),
         tuple(map(bool, attributes["box_periodic"])),
@@ -106,6 +132,7 @@ def _assembled(
         Basis(*(arrays[name] for name in _BASIS)),
         QuadraticSystem(*(jnp.asarray(arrays[name]) for name in _SYSTEM)),
         fluid,
+        recovery,
     )
     return TrainedFlow(
         flow,

@@ -22,6 +22,7 @@ from ..splines import LocalSplines
 from .energy_bound import EnergyBound
 from .log_density import from_log_density, to_log_density
 from .quadratic_system import QuadraticSystem, galerkin_system
+from .recovery import Recovery
 from .tensor_model import TensorModel
 
 
@@ -37,12 +38,15 @@ class ReducedFlow(eqx.Module):
         basis: of (r, u), r the logarithmic density.
         system: of its coordinates.
         fluid: gives densities their scale.
+        recovery: of velocity and pressure where modes are solenoidal; if there is none, fields are
+            those of the modes.
     """
 
     reference: ReferenceSpace
     basis: Basis
     system: QuadraticSystem
     fluid: Fluid
+    recovery: Recovery | None = None
 
     @classmethod
     def train(
@@ -75,16 +79,22 @@ class ReducedFlow(eqx.Module):
         mapped = np.concatenate([mapped_run(reference, run, scene.fluid) for run in runs], axis=-1)
         product = Energy() if product is None else product
         basis = decompose(mapped, product, scene.fluid, modes, centring)
-        return cls(reference, basis, galerkin_system(scene, basis, points), scene.fluid)
+        return cls.of_basis(scene, reference, basis)
+
+    @classmethod
+    def of_basis(cls, scene: Scene, reference: ReferenceSpace, basis: Basis) -> ReducedFlow:
+        """The scene's equations, projected on a basis of (r, u) on the reference points."""
+        system = galerkin_system(scene, basis, reference.points)
+        return cls(reference, basis, system, scene.fluid)
 
     def truncated(self, modes: int) -> ReducedFlow:
-        """The reduced model of the first modes; nothing is projected again.
+        """The reduced model of the first modes; nothing is projected again, nothing recovered.
 
         Raises:
             ValueError: if there are not so many.
         """
         basis, system = self.basis.truncated(modes), self.system.truncated(modes)
-        return eqx.tree_at(lambda f: (f.basis, f.system), self, (basis, system))
+        return ReducedFlow(self.reference, basis, system, self.fluid)
 
     def project(self, fields: Float[Array, "points fields *times"]) -> Float[Array, "*times modes"]:
         """Coordinates of (r, u) on the reference points, as `mapped_run` gives them."""
@@ -138,13 +148,13 @@ class ReducedFlow(eqx.Module):
         Raises:
             ValueError: if the points crowd a cell of the splines.
         """
-        modes, centre = self.basis.modes, self.basis.centre
+        functions = self.functions
         if points is None:
             points = np.asarray(self.reference.points)
         else:
-            modes, centre = self._basis_at(points)
-        change = jnp.einsum("gfm,sm->sgf", jnp.asarray(modes), coordinates)
-        fields = jnp.asarray(centre)[None] + change
+            functions = self._at(points)
+        matrix, rest = jax.vmap(self.shown.combination)(jnp.asarray(coordinates))
+        fields = functions @ matrix + rest
         density = from_log_density(fields[..., 0], self.fluid)
         return Trajectory(
             time=np.asarray(time),
@@ -155,14 +165,27 @@ class ReducedFlow(eqx.Module):
             coordinates=np.asarray(coordinates),
         )
 
-    def _basis_at(self, points):
-        values, space = np.asarray(self.basis.functions), self.reference.space
-        flat = values.reshape(len(values), -1)
-        splines = LocalSplines.fit(np.asarray(self.reference.points), flat, space)
+    @property
+    def shown(self) -> Basis | Recovery:
+        """What fields are made by."""
+        return self.basis if self.recovery is None else self.recovery
+
+    @property
+    def functions(self) -> Float[np.ndarray, "points functions"]:
+        """Of these, the functions on the reference points."""
+        return np.asarray(self.shown.functions).reshape(len(self.reference.points), -1)
+
+    def splines(self, **settings) -> LocalSplines:
+        """Of the functions, with settings as of `LocalSplines.fit`."""
+        points, space = np.asarray(self.reference.points), self.reference.space
+        return LocalSplines.fit(points, self.functions, space, **settings)
+
+    def _at(self, points) -> Float[Array, "places functions"]:
+        splines = self.splines()
         points = jnp.asarray(points, self.reference.points.dtype)
         if bool(splines.overflow(points)):
             raise ValueError("points: too many in one cell of the splines; ask for some at a time.")
-        return self.basis.parts(splines(points).reshape(-1, *values.shape[1:]))
+        return splines(points)
 
 
 @eqx.filter_jit

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Fluid, Snapshot
@@ -12,8 +11,10 @@ from jaxsph.full_model import wall_checks
 from jaxsph.integrate import Fault, FaultCode, Model
 from jaxsph.walls import Walls
 
+from ..basis import Basis
 from ..splines import LocalSplines
 from .log_density import from_log_density
+from .recovery import Recovery
 from .reduced_flow import ReducedFlow
 from .tensor_model import TensorModel
 
@@ -38,7 +39,8 @@ class TracerModel(Model):
 
     Args:
         flow: the model of the coordinates.
-        splines: of the modes and the centre, functions ordered (field, mode), the centre last.
+        splines: of what fields are made of.
+        shown: makes fields of it, the flow's basis or its recovery.
         fluid: gives densities their scale.
         spacing: of the reference points [m].
         walls: around the fluid, if it has any.
@@ -46,6 +48,7 @@ class TracerModel(Model):
 
     flow: TensorModel
     splines: LocalSplines
+    shown: Basis | Recovery
     fluid: Fluid
     spacing: float = eqx.field(static=True)
     walls: Walls | None = None
@@ -53,12 +56,8 @@ class TracerModel(Model):
     @classmethod
     def of(cls, flow: ReducedFlow, viscosity: Array, walls: Walls | None = None) -> TracerModel:
         """The model of tracers in a flow at a viscosity [m^2/s]."""
-        modes = np.asarray(flow.basis.modes)
-        centre = np.broadcast_to(np.asarray(flow.basis.centre), modes.shape[:2])
-        values = np.concatenate([modes, centre[..., None]], axis=2).astype(modes.dtype)
-        points, space = np.asarray(flow.reference.points), flow.reference.space
-        splines = LocalSplines.fit(points, values.reshape(len(points), -1), space, margin=_MARGIN)
-        return cls(flow.model(viscosity), splines, flow.fluid, space.spacing, walls)
+        splines, spacing = flow.splines(margin=_MARGIN), flow.reference.space.spacing
+        return cls(flow.model(viscosity), splines, flow.shown, flow.fluid, spacing, walls)
 
     def fields_at(
         self,
@@ -66,17 +65,15 @@ class TracerModel(Model):
         coordinates: Float[Array, " modes"],
         wanted: slice = slice(None),
     ) -> Float[Array, "particles fields"]:
-        """(r, u) at positions, or those wanted of them; weights are summed over modes first."""
-        ahead = jnp.append(coordinates, jnp.ones_like(coordinates[:1]))
-
-        def summed(weights):
-            return weights.reshape(*weights.shape[:2], -1, ahead.shape[0])[:, :, wanted] @ ahead
-
+        """(r, u), or what is wanted of it, at positions; the splines' weights are summed first."""
+        matrix, rest = (part[:, wanted] for part in self.shown.combination(coordinates))
         weights = (self.splines.node_weights, self.splines.linear_weights)
         of_flow = eqx.tree_at(
-            lambda s: (s.node_weights, s.linear_weights), self.splines, tuple(map(summed, weights))
+            lambda s: (s.node_weights, s.linear_weights),
+            self.splines,
+            tuple(w @ matrix for w in weights),
         )
-        return of_flow(position)
+        return of_flow(position) + rest
 
     def prepare(self, state):
         return None

@@ -23,7 +23,7 @@ class Case:
         projection: `galerkin` or `apg`.
         tau: memory length of the adjoint Petrov-Galerkin projection [s]; None for Galerkin.
         inner_product: `euclidean` or `energy`.
-        hyper: hyper-reduction, `none`, `tensor` or `tensor, linear closure`.
+        hyper: hyper-reduction, `none`, or `tensor` and what was added to it.
         trained_on: Reynolds numbers whose snapshots made the basis.
         velocity_peak_percent, velocity_median_percent: relative discrepancy of the velocity norm,
             largest and median over time [%].

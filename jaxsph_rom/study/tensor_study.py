@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,15 @@ import numpy as np
 
 from jaxsph.integrate import Fault, SimulationError
 
-from ..hyper import LinearClosure, TrainedFlow, mapped_run, sweep, train_flows
+from ..hyper import (
+    Formulation,
+    LinearClosure,
+    TrainedFlow,
+    formulation_for,
+    mapped_run,
+    sweep,
+    train_flows,
+)
 from ..hyper.fixed_points import check_steady
 from ..hyper.training import held_back, viscosity_of
 from .study import Experiment, Outcome, Study
@@ -24,13 +33,20 @@ class TensorStudy:
 
     Args:
         study: makes and keeps the full runs.
+        formulation: of the flows; what suits the scene if none is given.
         closed: whether flows have a linear closure.
         judge: Reynolds number of the training run that only judges it; chosen by `held_back` if
             none is given.
     """
 
-    def __init__(self, study: Study, closed: bool = False, judge: float | None = None):
-        self.study, self.closed, self.judge = study, closed, judge
+    def __init__(
+        self,
+        study: Study,
+        formulation: Formulation | None = None,
+        closed: bool = False,
+        judge: float | None = None,
+    ):
+        self.study, self.formulation, self.closed, self.judge = study, formulation, closed, judge
 
     def check(self, experiment: Experiment) -> None:
         """A ValueError if the experiment cannot be done on reference points."""
@@ -48,13 +64,18 @@ class TensorStudy:
             [study.scene(reynolds) for reynolds in experiment.trained_on],
             [study.full(reynolds) for reynolds in experiment.trained_on],
             experiment.modes,
-            study.product,
+            self._formulation(experiment),
             self._closure(experiment) if self.closed else None,
             study.progress,
         )
         for flow in trained:
             for reynolds in experiment.reynolds:
                 yield self._reduced(experiment, reynolds, flow)
+
+    def _formulation(self, experiment: Experiment) -> Formulation:
+        if self.formulation is not None:
+            return self.formulation
+        return formulation_for(self.study.scene(experiment.trained_on[0]), self.study.product)
 
     def _closure(self, experiment: Experiment) -> LinearClosure:
         judge = held_back(experiment.trained_on) if self.judge is None else self.judge
@@ -85,10 +106,20 @@ class TensorStudy:
             "modes": flow.basis.size,
             "projection": "galerkin",
             "tau": None,
-            "hyper": "tensor, linear closure" if self.closed else "tensor",
+            "hyper": _label(trained.training),
             "trained_on": tuple(experiment.trained_on),
             "rom_seconds": found.run_seconds if fault is None else None,
             "rom_compile_seconds": found.compile_seconds,
         }
         profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
         return study.judged(reynolds, flow.fields(coordinates, time), profile, fault, rest)
+
+
+def _label(training: dict[str, Any]) -> str:
+    """What kind of hyper-reduction a flow was trained with."""
+    parts = ["tensor"]
+    if training["formulation"] == "solenoidal":
+        parts.append("solenoidal")
+    if training["closure"] != "none":
+        parts.append(f"{training['closure']} closure")
+    return ", ".join(parts)
