@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .interpolation import ShepardMap
+from .interpolation import KernelMap, ShepardMap
 from .pairs import Space
 from .trajectory import Trajectory
 
@@ -59,15 +59,22 @@ def centre_line(space: Space) -> np.ndarray:
 
 
 def probe(
-    trajectory: Trajectory, points: np.ndarray, space: Space
+    trajectory: Trajectory,
+    points: np.ndarray,
+    space: Space,
+    rule: type[KernelMap] = ShepardMap,
 ) -> tuple[Float[np.ndarray, "times probes"], Float[np.ndarray, "times probes"]]:
-    """Velocity norm [m/s] and pressure [Pa] at points at all times, by Shepard interpolation."""
-    shepard = ShepardMap.allocate(jnp.asarray(points, trajectory.position.dtype), space)
+    """Velocity norm [m/s] and pressure [Pa] at points at all times.
+
+    By Shepard interpolation, or by `MovingLeastSquaresMap`, which keeps linear fields next to walls
+    too.
+    """
+    interpolated = rule.allocate(jnp.asarray(points, trajectory.position.dtype), space)
 
     @jax.jit
     def at(position, velocity, pressure):
         fields = jnp.concatenate([velocity, pressure[:, None]], axis=1)
-        return shepard(position, fields)
+        return interpolated(position, fields)
 
     speed, pressure = [], []
     for k in range(len(trajectory.time)):
