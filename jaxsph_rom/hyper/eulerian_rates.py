@@ -24,6 +24,7 @@ from ..field_advection import FieldAdvection
 from .cloud import Cloud
 from .fixed_points import kept_effects, with_effects, with_viscosity
 from .log_density import from_log_density
+from .reference_operators import neighbors_of
 
 
 class EulerianRates(eqx.Module):
@@ -66,7 +67,7 @@ class EulerianRates(eqx.Module):
             search = WalledSearch.allocate(
                 points, walls.position, box, support, 0.0, space.spacing, 1.0
             )
-        return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))
+        return cls(functional, points, neighbors_of(search, points))
 
     def __call__(
         self,

@@ -80,7 +80,7 @@ class ReferenceOperators(eqx.Module):
         check_steady(scene, points)
         functional = with_effects(scene.functional(), kept_effects(scene.effects))
         search = scene.search(ParticleState(points, points, points[:, 0]))
-        return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))
+        return cls(functional, points, neighbors_of(search, points))
 
     def affine(
         self, fields: Float[Array, "points fields"], viscosity: Float[Array, ""]
@@ -124,6 +124,12 @@ class ReferenceOperators(eqx.Module):
 
     def _state(self, fields) -> ParticleState:
         return ParticleState(self.points, fields[:, 1:], fields[:, 0])
+
+
+@eqx.filter_jit
+def neighbors_of(search, points: Float[Array, "points dim"]):
+    """The list of fixed points."""
+    return search.build(points)
 
 
 def mapped(function, stack: Float[Array, "points fields modes"], *arguments):

@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks import (
     convergence,
+    inner_products,
     paper_rom,
     right_hand_side,
     sampled_rom,
@@ -233,3 +234,27 @@ def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
     assert 0 < row["velocity_median_percent"] < 10 and row["stable"]
     assert row["floor_velocity_peak_percent"] > 0 and len(read["fom_seconds"]) == 5
     assert "30 Reynolds numbers, 30 stable" in capsys.readouterr().out
+
+
+def test_inner_products_are_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "products.json"
+    same = ["--resolution", "16", "--end-time", "0.1", "--modes", "3", "--json", str(path)]
+    assert inner_products.main(same) == 0
+    read = results(path)
+    assert len(read["rows"]) == 3 * 3 * 2
+    keys = {tuple(row[name] for name in inner_products.KEY) for row in read["rows"]}
+    assert len(keys) == len(read["rows"]) and ("energy", "mean", 5.0, 3) in keys
+    energy = [row for row in read["rows"] if row["product"] == "energy"]
+    assert len(energy) == 6 and all(row["stable"] for row in energy)
+    for row in energy:
+        assert 0 < row["velocity_median_percent"] < 20 and row["rom_seconds"]["median"] > 0
+        assert 0 < row["floor_pressure_median_percent"] < 100
+    capsys.readouterr()
+    read["rows"].pop(8)
+    write_json(path, read)
+    assert inner_products.main(same) == 0
+    assert "block-energy" in capsys.readouterr().out
+    again = results(path)["rows"]
+    assert again[:17] == read["rows"] and len(again) == 18
+    assert inner_products.main([*same, "--cutoff", "7"]) == 2
+    assert "other settings" in capsys.readouterr().err
