@@ -209,18 +209,19 @@ def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) 
         fields = flow.fields(coordinates, run.time, line)
         return np.linalg.norm(fields.velocity, axis=2), fields.pressure
 
-    row |= _percent("floor_", truth, profile(jnp.asarray(projected)))
+    row |= percent("floor_", truth, profile(jnp.asarray(projected)))
     if found is not None:
-        row |= _percent("", truth, profile(jnp.concatenate([first[None], found])))
+        row |= percent("", truth, profile(jnp.concatenate([first[None], found])))
     return row
 
 
-def _percent(prefix: str, truth, found) -> dict[str, float]:
+def percent(prefix: str, truth, found) -> dict[str, float]:
+    """Peak and median over time of the discrepancies of velocity and pressure on a line."""
     row = {}
     for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
-        percent = relative_discrepancy(a, b)
-        row[f"{prefix}{name}_peak_percent"] = float(percent.max())
-        row[f"{prefix}{name}_median_percent"] = float(np.median(percent))
+        over_time = relative_discrepancy(a, b)
+        row[f"{prefix}{name}_peak_percent"] = float(over_time.max())
+        row[f"{prefix}{name}_median_percent"] = float(np.median(over_time))
     return row
 
 
