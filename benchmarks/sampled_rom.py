@@ -27,7 +27,7 @@ from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
 from jaxsph.environment import environment
 from jaxsph.integrate import Model, integrate
 from jaxsph.io import check_target
-from jaxsph.metrics import centre_line, probe, relative_discrepancy
+from jaxsph.metrics import centre_line, probe
 from jaxsph_rom.hyper import (
     QDEIM,
     EulerianRates,
@@ -42,7 +42,7 @@ from jaxsph_rom.hyper import (
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, read_json, tell, write_json
-from .tensor_rom import TRAINED_ON, make_scene, train
+from .tensor_rom import TRAINED_ON, discrepancies, make_scene, train
 
 SELECTIONS = {"q-deim": QDEIM, "non-negative": NonNegativeWeights}
 REFERENCES = ("tensors", "all points")
@@ -147,7 +147,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             fields = flow.fields(jnp.asarray(coordinates), run.time, line)
             return np.linalg.norm(fields.velocity, axis=2), fields.pressure
 
-        floor = _percent("floor_", truth, profile(projected[options.reynolds]))
+        floor = discrepancies("floor_", truth, profile(projected[options.reynolds]))
         start = clock.perf_counter()
         visited = [_visited(1.0 / re, runs[re].time, projected[re]) for re in TRAINED_ON]
         modes_of_rates = rate_basis(rates, flow.basis, visited)
@@ -173,7 +173,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             found, online = _integrated(model, first, scene, len(run.time) - 1)
             row |= online | floor
             if row["stable"]:
-                row |= _percent("", truth, profile(np.concatenate([first[None], found])))
+                row |= discrepancies("", truth, profile(np.concatenate([first[None], found])))
             results["rows"].append(row)
             write_json(path, results)
             tell(f"M = {modes}, {row['selection']}, {row.get('samples', '-')} samples")
@@ -237,15 +237,6 @@ def _seconds_of_rates(rates: EulerianRates) -> float:
         jax.block_until_ready(evaluate(jnp.zeros(()), fields, jnp.asarray(0.01)))
         seconds.append(clock.perf_counter() - start)
     return min(seconds[1:])
-
-
-def _percent(prefix: str, truth, found) -> dict[str, float]:
-    row = {}
-    for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
-        percent = relative_discrepancy(a, b)
-        row[f"{prefix}{name}_peak_percent"] = float(percent.max())
-        row[f"{prefix}{name}_median_percent"] = float(np.median(percent))
-    return row
 
 
 def _table(results: dict[str, Any]) -> str:

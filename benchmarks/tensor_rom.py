@@ -218,9 +218,9 @@ def discrepancies(prefix: str, truth, found) -> dict[str, float]:
     """Peak and median over time of the discrepancy of velocity norm and pressure."""
     row = {}
     for name, a, b in zip(("velocity", "pressure"), truth, found, strict=True):
-        percent = relative_discrepancy(a, b)
-        row[f"{prefix}{name}_peak_percent"] = float(percent.max())
-        row[f"{prefix}{name}_median_percent"] = float(np.median(percent))
+        over_time = relative_discrepancy(a, b)
+        row[f"{prefix}{name}_peak_percent"] = float(over_time.max())
+        row[f"{prefix}{name}_median_percent"] = float(np.median(over_time))
     return row
 
 

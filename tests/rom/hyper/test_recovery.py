@@ -80,7 +80,8 @@ def test_pressure_is_learnt_from_a_snapshot_on():
 def cavity():
     scenes = [lid_driven_cavity(10, re, end_time=0.4) for re in (50.0, 100.0)]
     runs = [run_scene(scene) for scene in scenes]
-    (trained,) = train_flows(scenes, runs, (4,), Solenoidal(3), LinearClosure(window=10, iterations=20))
+    closure = LinearClosure(window=10, iterations=20)
+    (trained,) = train_flows(scenes, runs, (4,), Solenoidal(3), closure)
     return trained, scenes, runs
 
 
