@@ -47,7 +47,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def _command(argv) -> int:
     options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", "memory_length.json")
+    name = f"memory_length_{options.resolution}.json"
+    path = options.json or Path("benchmarks", "results", name)
     check_target(path)
     with jax.enable_x64(True):
         results = _started(path, options)
@@ -76,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/memory-length)")  # fmt: skip
     add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/memory_length.json")  # fmt: skip
+        help="default: benchmarks/results/memory_length_RESOLUTION.json")  # fmt: skip
     return parser
 
 
