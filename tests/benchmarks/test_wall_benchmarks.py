@@ -5,7 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import lid_driven_cavity, open_cavity, plane_flows, viscous_sum, wall_cost
+from benchmarks import (
+    lid_driven_cavity,
+    open_cavity,
+    plane_flows,
+    viscous_sum,
+    wall_cost,
+    walled_rom,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -103,3 +110,19 @@ def test_frequency_and_settling_of_a_known_signal():
     assert found == pytest.approx(-np.log(0.01 * period / (1.0 - np.exp(-period)) ** 2), abs=0.1)
     assert open_cavity.settling_time(time, energy, None, 0.01) is None
     assert open_cavity.settling_time(time, np.exp(time), 1.0 / period, 0.01) is None
+
+
+def test_reduced_models_between_walls_beside_the_sound_of_the_full_one(tmp_path, capsys):
+    path = tmp_path / "walled.json"
+    arguments = ["lid-driven-cavity", "--resolution", "14", "--end-time", "1.2", "--from", "0.5",
+                 "--train", "50", "100", "--predict", "75", "--modes", "3", "--closures", "none",
+                 "--formulations", "solenoidal", "--json", str(path)]  # fmt: skip
+    assert walled_rom.main(arguments) == 0
+    (row,) = rows = json.loads(path.read_text())["rows"]
+    assert row["stable"] and row["predicted"] and row["rom_seconds"]["median"] > 0
+    assert 0 < row["floor_velocity_on_points_median_percent"] < 1
+    assert 0 < row["sound_on_points_peak_percent"] < 200
+    assert row["velocity_on_line_start_peak_percent"] > 0
+    capsys.readouterr()
+    assert walled_rom.main(arguments) == 0
+    assert json.loads(path.read_text())["rows"] == rows
