@@ -14,6 +14,7 @@ from jaxsph.scenes import couette, lid_driven_cavity, open_cavity, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph_rom import Basis, Energy, ReferenceSpace, pod
 from jaxsph_rom.hyper import (
+    QuadraticSystem,
     ReferenceOperators,
     TensorModel,
     from_log_density,
@@ -199,3 +200,16 @@ def test_a_force_that_has_settled_is_a_constant_part():
     np.testing.assert_allclose(found[driven, 1], 0.1, rtol=1e-9)  # b0 k0
     system = galerkin_system(scene, random_basis(scene), place)
     assert float(jnp.abs(system.constant[0]).max()) > 0.0
+
+
+def test_rates_are_those_of_the_formula():
+    rng = np.random.default_rng(3)
+    system = QuadraticSystem(
+        *(jnp.asarray(rng.normal(size=shape)) for shape in ((2, 4), (2, 4, 4), (4, 4, 4)))
+    )
+    a, viscosity = rng.normal(size=4), 0.3
+    wanted = system.constant[0] + viscosity * system.constant[1]
+    wanted += (system.linear[0] + viscosity * system.linear[1]) @ a
+    wanted += np.einsum("kij,i,j->k", system.quadratic, a, a)
+    found = system(jnp.asarray(a), jnp.asarray(viscosity))
+    np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-13)
