@@ -100,7 +100,7 @@ class ReferenceOperators(eqx.Module):
         )
         points = jnp.asarray(points, scene.state.position.dtype)
         search = scene.search(ParticleState(points, points, points[:, 0]))
-        return cls(functional, points, eqx.filter_jit(lambda s, x: s.build(x))(search, points))
+        return cls(functional, points, _neighbors(search, points))
 
     def affine(
         self, fields: Float[Array, "points fields"], viscosity: Float[Array, ""]
@@ -156,6 +156,11 @@ class ReferenceOperators(eqx.Module):
 
     def _state(self, fields) -> ParticleState:
         return ParticleState(self.points, fields[:, 1:], fields[:, 0])
+
+
+@eqx.filter_jit
+def _neighbors(search, points):
+    return search.build(points)
 
 
 def _acts_on_ghosts(effect: Effect) -> bool:
