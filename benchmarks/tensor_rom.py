@@ -118,7 +118,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
         "device": jax.devices()[0].device_kind,
         "environment": environment(),
     }
-    truth = {re: _profile(scenes[re], run) for re, run in runs.items()}
+    truth = {re: profile_of(scenes[re], run) for re, run in runs.items()}
     for modes in options.modes:
         flow = largest.truncated(modes)
         projected = {re: np.asarray(flow.project(fields)) for re, fields in mapped.items()}
@@ -132,7 +132,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             results["offline"].append(offline)
             for re in left:
                 row = {"reynolds": re, "modes": modes, "closure": closure}
-                row |= _judged(closed, scenes[re], runs[re], projected[re], truth[re])
+                row |= judged(closed, scenes[re], runs[re], projected[re], truth[re])
                 results["rows"].append(row)
                 write_json(path, results)
 
@@ -177,11 +177,11 @@ def _closed(flow: ReducedFlow, scene: Scene, projected, iterations: int):
     return ReducedFlow(flow.reference, flow.basis, fitted.system, flow.fluid), seconds
 
 
-def _profile(scene: Scene, run: Trajectory):
+def profile_of(scene: Scene, run: Trajectory):
     return probe(run, centre_line(scene.space), scene.space)
 
 
-def _judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -> dict[str, Any]:
+def judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -> dict[str, Any]:
     """Errors on the centre line, the projection's own as a floor, and times."""
     snapshots = len(run.time) - 1
     arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)

@@ -7,7 +7,14 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import convergence, paper_rom, right_hand_side, tensor_rom, tensor_stability
+from benchmarks import (
+    convergence,
+    inner_products,
+    paper_rom,
+    right_hand_side,
+    tensor_rom,
+    tensor_stability,
+)
 from benchmarks.measure import interacting_pairs, peak_memory_gib, read_json, summary, write_json
 from benchmarks.references import source_paper
 from jaxsph.arrangements import JitteredLattice
@@ -187,3 +194,27 @@ def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
     for row in rows:
         assert row["stable"] and row["highest_energy_over_start"] <= 1.001
     assert "9 of 9 runs stable" in capsys.readouterr().out
+
+
+def test_inner_products_are_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "products.json"
+    same = ["--resolution", "16", "--end-time", "0.1", "--modes", "3", "--json", str(path)]
+    assert inner_products.main(same) == 0
+    read = results(path)
+    assert len(read["rows"]) == 3 * 3 * 2
+    keys = {tuple(row[name] for name in inner_products.KEY) for row in read["rows"]}
+    assert len(keys) == len(read["rows"]) and ("energy", "mean", 5.0, 3) in keys
+    energy = [row for row in read["rows"] if row["product"] == "energy"]
+    assert len(energy) == 6 and all(row["stable"] for row in energy)
+    for row in energy:
+        assert 0 < row["velocity_median_percent"] < 20 and row["rom_seconds"]["median"] > 0
+        assert 0 < row["floor_pressure_median_percent"] < 100
+    capsys.readouterr()
+    read["rows"].pop(8)
+    write_json(path, read)
+    assert inner_products.main(same) == 0
+    assert "block-energy" in capsys.readouterr().out
+    again = results(path)["rows"]
+    assert again[:17] == read["rows"] and len(again) == 18
+    assert inner_products.main([*same, "--cutoff", "7"]) == 2
+    assert "other settings" in capsys.readouterr().err
