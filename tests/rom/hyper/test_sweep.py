@@ -33,7 +33,7 @@ def make_flow(growth=0.0):
     flat, _ = np.linalg.qr(rng.normal(size=(3 * len(points), MODES)))
     modes = flat.reshape(len(points), 3, MODES)
     modes[:, 0] /= 10.0  # weight (c0 / rho0)^2 = 100
-    basis = Basis(modes, np.array([1.0, 0.0, 0.0]), np.array([100.0, 1.0, 1.0]), np.ones(5))
+    basis = Basis(modes, np.array([[1.0, 0.0, 0.0]]), np.array([100.0, 1.0, 1.0]), np.ones(5))
     linear = np.zeros((2, MODES, MODES))
     linear[0, 0, 1], linear[0, 1, 0] = 3.0, -3.0
     linear[1] = -20.0 * np.eye(MODES)
@@ -86,7 +86,7 @@ def test_one_that_blows_up_takes_no_other_along():
 def test_energy_is_that_of_the_fields():
     flow = make_flow()
     rng = np.random.default_rng(2)
-    basis = Basis(flow.basis.modes, np.array([0.9, 0.2, -0.1]), np.ones(3), np.ones(5))
+    basis = Basis(flow.basis.modes, np.array([[0.9, 0.2, -0.1]]), np.ones(3), np.ones(5))
     bound = EnergyBound.of(basis, flow.fluid)
     a = rng.normal(size=MODES)
     fields = basis.centre + basis.modes @ a

@@ -29,7 +29,7 @@ def steady_flow(velocity, periodic=True):
     space = Space(Box((0.0, 0.0), (1.0, 1.0), (periodic, periodic)), WendlandC2(), 1 / 12, 1 / 24)
     points = Lattice().positions(space)
     fields = np.concatenate([np.zeros((len(points), 1)), velocity(np.asarray(points))], axis=1)
-    basis = Basis(fields[..., None], np.array([1.0, 0.0, 0.0]), np.ones(3), np.ones(1))
+    basis = Basis(fields[..., None], np.array([[1.0, 0.0, 0.0]]), np.ones(3), np.ones(1))
     system = QuadraticSystem(jnp.zeros((2, 1)), jnp.zeros((2, 1, 1)), jnp.zeros((1, 1, 1)))
     fluid = Fluid(*map(jnp.asarray, (1.0, 10.0, 1.0)))
     return ReducedFlow(ReferenceSpace(points, space, ShepardMap), basis, system, fluid)
