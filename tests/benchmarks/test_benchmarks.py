@@ -166,6 +166,7 @@ def test_files(tmp_path):
     assert 0.01 < peak_memory_gib() < 1000
 
 
+@pytest.mark.slow
 def test_tensor_models_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "tensor.json"
     same = ["--resolution", "24", "--end-time", "0.05", "--modes", "2", "--iterations", "20"]
@@ -198,6 +199,7 @@ def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
     assert "9 of 9 runs stable" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_sampled_models_come_nearer_with_more_samples(tmp_path, capsys):
     path = tmp_path / "sampled.json"
     same = ["--resolution", "16", "--end-time", "0.05", "--modes", "2", "--json", str(path)]
@@ -236,6 +238,7 @@ def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
     assert "30 Reynolds numbers, 30 stable" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_inner_products_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "products.json"
     same = ["--resolution", "16", "--end-time", "0.4", "--modes", "3", "--json", str(path)]

@@ -21,6 +21,7 @@ def results(path):
     return read
 
 
+@pytest.mark.slow
 def test_memory_lengths_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "memory.json"
     same = ["--resolution", "12", "--end-time", "0.05", "--modes", "2", "--json", str(path)]
@@ -40,6 +41,7 @@ def test_memory_lengths_are_taken_up_again(tmp_path, capsys):
     assert "other settings" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_larger_steps(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(larger_steps, "SOLVERS", {
         name: larger_steps.SOLVERS[name] for name in ("tsit5", "kvaerno3")

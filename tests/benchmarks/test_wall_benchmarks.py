@@ -112,6 +112,7 @@ def test_frequency_and_settling_of_a_known_signal():
     assert open_cavity.settling_time(time, np.exp(time), 1.0 / period, 0.01) is None
 
 
+@pytest.mark.slow
 def test_reduced_models_between_walls_beside_the_sound_of_the_full_one(tmp_path, capsys):
     path = tmp_path / "walled.json"
     arguments = ["lid-driven-cavity", "--resolution", "14", "--end-time", "1.2", "--from", "0.5",

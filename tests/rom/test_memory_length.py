@@ -144,6 +144,7 @@ def test_what_sets_no_memory_length_is_refused(vortex):
         SpectralMemory()(model, lost)
 
 
+@pytest.mark.slow
 def test_a_study_tells_rules_apart_and_goes_on(tmp_path):
     def make(reynolds):
         return taylor_green(12, reynolds, arrangement=Lattice(), end_time=0.04, time_step=0.01)

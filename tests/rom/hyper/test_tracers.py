@@ -60,7 +60,7 @@ def test_tracers_stay_on_their_streamlines():
 
 def test_a_centre_that_moves_carries_them_too():
     flow = steady_flow(lambda x: np.ones_like(x))
-    flow = eqx.tree_at(lambda f: f.basis.centre, flow, np.array([1.0, -SPEED, 0.0]))
+    flow = eqx.tree_at(lambda f: f.basis.centre, flow, np.array([[1.0, -SPEED, 0.0]]))
     model = TracerModel.of(flow, jnp.asarray(0.01))
     position = jnp.asarray([[0.2, 0.9], [0.7, 0.4]])
     end, fault, _, _ = run(model, position, 10, 0.04)
