@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+from .particles import ParticleState
 
 
 class Snapshot(eqx.Module):
@@ -48,3 +51,8 @@ class Trajectory(eqx.Module):
     def nearest(self, time: float) -> int:
         """The number of the snapshot nearest to a time [s]."""
         return int(np.argmin(np.abs(self.time - time)))
+
+    def state(self, number: int) -> ParticleState:
+        """The particles of a snapshot, as a run can go on from them; -1 for the last."""
+        fields = (self.position, self.velocity, self.density)
+        return ParticleState(*(jnp.asarray(field[number]) for field in fields))

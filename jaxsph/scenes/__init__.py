@@ -1,6 +1,7 @@
 """Scenes, one a file; `SCENES` lists them by the name that users type."""
 
 from .balanced import balanced as balanced
+from .continued import continued as continued
 from .couette import couette as couette
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity

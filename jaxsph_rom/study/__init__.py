@@ -6,6 +6,7 @@ from .plans import Plan as Plan
 from .quiet_start import quiet as quiet
 from .recorded_run import full_run as full_run
 from .recorded_run import recorded_run as recorded_run
+from .recorded_run import with_record as with_record
 from .settled import settled as settled
 from .study import Experiment as Experiment
 from .study import Outcome as Outcome

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 
-from jaxsph import ParticleState, Trajectory, simulate
+from jaxsph import Trajectory, simulate
 from jaxsph.integrate import Model
 from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.scenes import Scene
@@ -88,20 +87,12 @@ def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
     """The full model's trajectory, kept in `folder`."""
     reynolds = scene.parameters["reynolds"]
 
-    def restore(trajectory):
-        return ParticleState(
-            *(
-                jnp.asarray(a[-1])
-                for a in (trajectory.position, trajectory.velocity, trajectory.density)
-            )
-        )
-
     return recorded_run(
         folder / f"re-{reynolds:g}" / "trajectory.h5",
         scene,
         scene.model,
         lambda _: scene.state,
-        restore,
+        lambda trajectory: trajectory.state(-1),
         f"full model, Re {reynolds:g}",
         progress,
     )

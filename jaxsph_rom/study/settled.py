@@ -7,14 +7,13 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-import jax.numpy as jnp
+from jaxsph.scenes import Scene, continued
 
-from jaxsph import ParticleState
-from jaxsph.scenes import Scene
-
-from .recorded_run import Progress, full_run
+from .recorded_run import Progress, full_run, with_record
 
 _SNAPSHOTS = 50  # kept of the time before
+_COARSEST = 80  # particles along the longest side; with fewer the flow would settle differently
+_COARSE_SHARE = 0.8  # of the time that may run at half the resolution
 
 
 def settled(
@@ -22,25 +21,36 @@ def settled(
 ) -> Callable[[float], Scene]:
     """Scenes of a Reynolds number whose particles are those of a run from rest, after a time.
 
-    The run from rest is kept in `folder` and taken up again where it was cut short.
+    Where half the resolution still resolves the flow, four fifths of that time are run with it, at
+    an eighth of the price in two dimensions, and the rest goes on from there (`continued`). The
+    runs are kept in `folder` and taken up again where they were cut short.
 
     Args:
-        make: a scene from a Reynolds number and the settings `start_time` and, for the run from
-            rest, `end_time`.
+        make: a scene from a Reynolds number, the setting `start_time` and, for the runs before,
+            `end_time`, `time_step` and `resolution`.
         settling: length of the run from rest [s].
         folder: where it is kept.
         progress: opens a progress bar.
     """
 
+    def before(reynolds: float, start_time: float, end_time: float, **more) -> Scene:
+        given = {"reynolds": reynolds, "start_time": start_time, "end_time": end_time - start_time}
+        free = make(**given, **more)
+        each = math.ceil(free.steps / _SNAPSHOTS)
+        step = given["end_time"] / (each * _SNAPSHOTS)
+        return dataclasses.replace(make(**given, **more, time_step=step), steps_per_snapshot=each)
+
     def scene(reynolds: float) -> Scene:
-        rest = make(reynolds=reynolds, start_time=0.0, end_time=settling)
-        each = math.ceil(rest.steps / _SNAPSHOTS)
-        step = settling / (each * _SNAPSHOTS)
-        rest = make(reynolds=reynolds, start_time=0.0, end_time=settling, time_step=step)
-        rest = dataclasses.replace(rest, steps_per_snapshot=each)
-        before = full_run(folder, rest, progress)
-        fields = (before.position, before.velocity, before.density)
-        state = ParticleState(*(jnp.asarray(field[-1]) for field in fields))
-        return dataclasses.replace(make(reynolds=reynolds, start_time=settling), state=state)
+        start = make(reynolds=reynolds, start_time=settling)
+        half = 4 * (start.parameters["resolution"] // 8)  # a multiple of four fits all scenes
+        if half < _COARSEST:
+            last = before(reynolds, 0.0, settling)
+        else:
+            changed = _COARSE_SHARE * settling
+            coarse = before(reynolds, 0.0, changed, resolution=half)
+            run = full_run(folder / f"resolution-{half}", coarse, progress)
+            last = before(reynolds, changed, settling)
+            last = continued(with_record(last, continued_from=half), run.state(-1), coarse.space)
+        return dataclasses.replace(start, state=full_run(folder, last, progress).state(-1))
 
     return scene
