@@ -44,6 +44,16 @@ def compiled(function: Callable, *arguments) -> tuple[Callable[[], Any], float]:
     return lambda: jax.block_until_ready(program(*arguments)), seconds
 
 
+def repeated(call: Callable[[], Any], repeats: int) -> tuple[Any, float, list[float]]:
+    """The result of a call, its first time [s] with compilation in it, and times of repeats [s]."""
+    seconds = []
+    for _ in range(1 + repeats):
+        start = clock.perf_counter()
+        found = jax.block_until_ready(call())
+        seconds.append(clock.perf_counter() - start)
+    return found, seconds[0], seconds[1:]
+
+
 def alternate(
     calls: Mapping[str, Callable[[], Any]], repeats: int
 ) -> tuple[dict[str, list[float]], dict[str, list[float]]]:

@@ -30,7 +30,16 @@ from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom.hyper import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
 from jaxsph_rom.study import full_run, quiet
 
-from .measure import format_rows, number, progress, read_json, summary, tell, write_json
+from .measure import (
+    format_rows,
+    number,
+    progress,
+    read_json,
+    repeated,
+    summary,
+    tell,
+    write_json,
+)
 
 TRAINED_ON = (100.0, 150.0, 200.0, 250.0)
 HELD_BACK = 200.0
@@ -143,13 +152,14 @@ def train(scene: Scene, runs: list[Trajectory], modes: int) -> ReducedFlow:
     return jax.block_until_ready(flow)
 
 
-def make_scene(options, reynolds: float) -> Scene:
+def make_scene(options, reynolds: float, time_step: float | None = None) -> Scene:
     """Stirred particles at a balanced pressure."""
     scene = taylor_green(
         options.resolution,
         reynolds,
         scale=options.scale,
         end_time=options.end_time,
+        time_step=time_step,
         arrangement=Stirred(),
         dtype="float64",
     )
@@ -185,20 +195,19 @@ def judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -
     snapshots = len(run.time) - 1
     arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)
     first = jnp.asarray(projected[0])
-    seconds, fault, found = [], None, None
+    first_seconds, seconds, fault, found = None, [], None, None
     try:
-        for _ in range(1 + _REPEATS):
-            start = clock.perf_counter()
-            found = jax.block_until_ready(flow.predict(first, *arguments, snapshots))
-            seconds.append(clock.perf_counter() - start)
+        found, first_seconds, seconds = repeated(
+            lambda: flow.predict(first, *arguments, snapshots), _REPEATS
+        )
     except SimulationError as error:
         fault = str(error)
     metadata = run.metadata
     row = {
         "stable": fault is None,
         "fault": fault,
-        "rom_compile_and_first_seconds": seconds[0] if seconds else None,
-        "rom_seconds": summary(seconds[1:]),
+        "rom_compile_and_first_seconds": first_seconds,
+        "rom_seconds": summary(seconds),
         "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
         "steps": scene.steps,
     }

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import time as clock
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,7 +43,7 @@ from jaxsph_rom.hyper.log_density import from_log_density
 from jaxsph_rom.hyper.training import held_back, viscosity_of
 from jaxsph_rom.study import PLANS, full_run
 
-from .measure import format_rows, number, progress, read_json, summary, tell, write_json
+from .measure import format_rows, number, progress, read_json, repeated, summary, tell, write_json
 
 FORMULATIONS = {"compressible": Compressible(), "solenoidal": Solenoidal()}
 CLOSURES = ("none", "linear")
@@ -214,17 +213,14 @@ def _judged(
     arguments = viscosity_of(scene), scene.time_step, scene.steps_per_snapshot, len(run.time) - 1
     seconds, fault, found = [], None, None
     try:
-        for _ in range(1 + _REPEATS):
-            start = clock.perf_counter()
-            found = jax.block_until_ready(flow.predict(projected[0], *arguments))
-            seconds.append(clock.perf_counter() - start)
+        found, _, seconds = repeated(lambda: flow.predict(projected[0], *arguments), _REPEATS)
     except SimulationError as error:
         fault = str(error)
     metadata = run.metadata
     row = {
         "stable": fault is None,
         "fault": fault,
-        "rom_seconds": summary(seconds[1:]),
+        "rom_seconds": summary(seconds),
         "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
         "steps": scene.steps,
     }

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
+from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.io import read_trajectory
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
@@ -74,6 +75,7 @@ class Study:
         probes: where runs are compared, (P, n) [m] from a scene; the centre line if none is given.
         judged_from: time [s] from which on peaks and medians are taken.
         centring: of the POD; the product's own if none.
+        rule: of the map to the reference points; the paper's if none.
     """
 
     def __init__(
@@ -88,6 +90,7 @@ class Study:
         probes: Callable[[Scene], np.ndarray] | None = None,
         judged_from: float = 0.0,
         centring: Centring | None = None,
+        rule: type[KernelMap] = ShepardMap,
     ):
         self.scene = cache(make)
         self.folder = Path(folder)
@@ -97,6 +100,7 @@ class Study:
         self.advection = PaperAdvection() if advection is None else advection
         self.spline_order = spline_order
         self.progress = silent if progress is None else progress
+        self.rule = rule
         self._probes = _centre_line if probes is None else probes
         self.judged_from = judged_from
         self.full = cache(self._full)
@@ -131,12 +135,13 @@ class Study:
     def reference(self, experiment: Experiment) -> ReferenceSpace:
         """The reference space: the initial configuration of the first training run."""
         scene = self.scene(experiment.trained_on[0])
-        return ReferenceSpace(scene.state.position, scene.space)
+        return ReferenceSpace(scene.state.position, scene.space, self.rule)
 
     def _snapshots(self, reynolds: float, first: float) -> np.ndarray:
         """Mapped snapshots of a run on the reference space of the run at Re `first`."""
         scene = self.scene(first)
-        return ReferenceSpace(scene.state.position, scene.space).snapshots(self.full(reynolds))
+        reference = ReferenceSpace(scene.state.position, scene.space, self.rule)
+        return reference.snapshots(self.full(reynolds))
 
     def basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
         """POD basis of the training runs on the reference space."""
@@ -178,6 +183,16 @@ class Study:
         own = isinstance(self.centring, type(self.product.centring))
         return product if own else f"{product}-{centring}"
 
+    @property
+    def _options(self) -> str:
+        """What reduced runs of other studies in this folder may differ in, but for the paper's."""
+        parts = [self._product_name.lower()]
+        if self.advection != PaperAdvection():
+            parts.append(self.advection.name)
+        if self.rule is not ShepardMap:
+            parts.append(self.rule.__name__.removesuffix("Map").lower())
+        return "-".join(parts)
+
     def _reduced(self, experiment, reynolds, basis, splines, projection) -> Outcome:
         scene = self.scene(reynolds)
         memory = None
@@ -198,6 +213,7 @@ class Study:
                 "inner_product": self._product_name,
                 "advection": self.advection.name,
                 "spline_order": self.spline_order,
+                "map": self.rule.__name__,
             },
         )
 
@@ -206,8 +222,7 @@ class Study:
                 jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
             )
 
-        product = self._product_name.lower()
-        path = self.folder / "reduced" / f"{product}-{trained}" / f"re-{reynolds:g}"
+        path = self.folder / "reduced" / f"{self._options}-{trained}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
         fault = None
         try:

@@ -1,0 +1,145 @@
+"""What each of the source paper's options does to the reduced lid-driven cavity.
+
+    python -m benchmarks.cavity_options
+
+Reduced models on moving particles at Re 100, trained on the same run: inner product, advection and
+map are the paper's or this project's, in all combinations. How long each stays good, and its errors
+until then. Full and reduced runs are kept in a folder, the full one that of `benchmarks.paper_rom`
+if it has made it: the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxsph import SimulationError
+from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph.environment import environment
+from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
+from jaxsph.io import check_target
+from jaxsph.scenes import lid_driven_cavity
+from jaxsph_rom import (
+    ConsistentAdvection,
+    Energy,
+    Euclidean,
+    Experiment,
+    Galerkin,
+    PaperAdvection,
+    Study,
+)
+from jaxsph_rom.study import PLANS, Outcome
+
+from .measure import format_rows, number, progress, write_json
+
+REYNOLDS = 100.0
+CHOICES = tuple(product(
+    (Euclidean(), Energy()),
+    (PaperAdvection(), ConsistentAdvection()),
+    (ShepardMap, MovingLeastSquaresMap),
+))  # fmt: skip
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: the full run failed, 2: bad input."""
+    return report_errors("cavity_options", _command, argv)
+
+
+def _command(argv) -> int:
+    options = _parser().parse_args(argv)
+    check_target(options.json, overwrite=True)
+    with jax.enable_x64(True):
+        try:
+            results = {"rows": list(_rows(options)), "environment": environment()}
+        except SimulationError as error:
+            return fail("cavity_options", f"full model: {error}", 1)
+    write_json(options.json, results)
+    print(_table(results["rows"]))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.cavity_options", description=__doc__.splitlines()[0]
+    )
+    add = parser.add_argument
+    add("--resolution", type=positive_int, metavar="N", help="instead of the small scale's")
+    add("--end-time", type=positive_float, default=10.0, metavar="T", help="[s] (default: 10)")
+    add("--modes", type=positive_int, default=10, metavar="M", help="default: %(default)s")
+    add("--out", type=Path, default=Path("out/paper-rom-lid-driven-cavity-small"), metavar="DIR",
+        help="where runs are kept (default: %(default)s)")  # fmt: skip
+    add("--json", type=Path, default=Path("benchmarks/results/cavity_options.json"), metavar="FILE",
+        help="default: %(default)s")  # fmt: skip
+    return parser
+
+
+def _rows(options):
+    plan = PLANS["lid-driven-cavity"]
+    make = partial(
+        lid_driven_cavity, options.resolution, end_time=options.end_time, dtype="float64"
+    )
+    for inner_product, advection, rule in CHOICES:
+        study = Study(
+            lambda reynolds: make(reynolds=reynolds),
+            options.out,
+            projections=(Galerkin(),),
+            product=inner_product,
+            advection=advection,
+            progress=progress,
+            probes=plan.probes,
+            rule=rule,
+        )
+        experiment = Experiment((REYNOLDS,), (REYNOLDS,), (options.modes,))
+        (outcome,) = study.run(experiment)
+        yield {
+            "inner_product": type(inner_product).__name__,
+            "advection": advection.name,
+            "map": rule.__name__,
+            **_figures(outcome),
+            "device": jax.devices()[0].device_kind,
+        }
+
+
+def _figures(outcome: Outcome) -> dict[str, Any]:
+    """Errors over the time that the run stayed good; `lasted` is that time."""
+    case = outcome.case
+    return {
+        "modes": case.modes,
+        "lasted": case.fault_time if case.fault_time is not None else float(outcome.time[-1]),
+        "fault": case.fault,
+        **{
+            f"{name}_{what}_percent": float(of(percent[1:]))
+            for name, percent in (
+                ("velocity", outcome.velocity_percent), ("pressure", outcome.pressure_percent)
+            )
+            for what, of in (("peak", np.max), ("median", np.median))
+        },
+        "rom_seconds_per_step": outcome.trajectory.metadata["run_seconds"]
+        / outcome.trajectory.metadata["steps"],
+        "fom_seconds": case.fom_seconds,
+    }  # fmt: skip
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    header = ("product", "advection", "map", "lasted s", "velocity %", "median", "pressure %",
+              "median", "ms per step")  # fmt: skip
+    cells = [
+        (
+            row["inner_product"], row["advection"], row["map"], number(row["lasted"]),
+            *(number(row[f"{name}_percent"]) for name in (
+                "velocity_peak", "velocity_median", "pressure_peak", "pressure_median")),
+            number(1e3 * row["rom_seconds_per_step"]),
+        )
+        for row in rows
+    ]  # fmt: skip
+    return "on the centre line, Re 100\n" + format_rows(header, cells)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
