@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import jax
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -71,19 +71,18 @@ def probe(
     """
     interpolated = rule.allocate(jnp.asarray(points, trajectory.position.dtype), space)
 
-    @jax.jit
-    def at(position, velocity, pressure):
-        fields = jnp.concatenate([velocity, pressure[:, None]], axis=1)
-        return interpolated(position, fields)
-
     speed, pressure = [], []
     for k in range(len(trajectory.time)):
-        fields, overflow = at(
-            trajectory.position[k], trajectory.velocity[k], trajectory.pressure[k]
-        )
+        values = np.concatenate([trajectory.velocity[k], trajectory.pressure[k][:, None]], axis=1)
+        fields, overflow = _interpolated(interpolated, trajectory.position[k], values)
         if bool(overflow):
             raise ValueError(f"probe: particles have clumped at snapshot {k}; cells are too full.")
         fields = np.asarray(fields)
         speed.append(np.linalg.norm(fields[:, :-1], axis=1))
         pressure.append(fields[:, -1])
     return np.stack(speed), np.stack(pressure)
+
+
+@eqx.filter_jit  # compiled once for runs alike
+def _interpolated(rule: KernelMap, position, values):
+    return rule(position, values)

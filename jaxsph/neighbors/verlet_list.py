@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
@@ -102,7 +101,7 @@ class NeighborSearch(eqx.Module):
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
         cell_capacity = int(1.3 * grid.occupancy(position)) + 2
         trial = cls(grid, support, skin, 1, cell_capacity)
-        largest = int(jax.jit(lambda x: trial._flag(x)[2])(position))
+        largest = int(_most_neighbors(trial, position))
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
         return cls(grid, support, skin, capacity, cell_capacity)
@@ -220,3 +219,8 @@ def pick(
 
     row = own + jnp.arange(words.shape[0], dtype=jnp.int32)
     return chunked_map(rows, (words, cell, row), max(1, _BLOCK // (capacity * count)))
+
+
+@eqx.filter_jit  # compiled once for scenes alike
+def _most_neighbors(search: NeighborSearch, position):
+    return search._flag(position)[2]

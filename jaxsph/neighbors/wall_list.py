@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
@@ -146,7 +145,7 @@ class WalledSearch(eqx.Module):
             int(1.3 * wall_grid.occupancy(position)) + 2,
             wall_grid.occupancy(ghosts),
         )
-        largest = int(jax.jit(lambda x: trial._flag(x)[-1][1])(position))
+        largest = int(_most_ghosts(trial, position))
         return replace(trial, capacity=max(8, int(np.ceil(margin * largest))))
 
     @property
@@ -248,3 +247,8 @@ def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     safe = np.where(closed, 1.0, lengths)
     wrapped = np.where(closed, points, np.mod(points, safe))
     return np.where(~closed & (wrapped >= safe), 0.0, wrapped)  # mod may round up to the length
+
+
+@eqx.filter_jit  # compiled once for scenes alike
+def _most_ghosts(search: WalledSearch, position):
+    return search._flag(position)[-1][1]
