@@ -126,6 +126,34 @@ def progress(label: str, total: int, done: int = 0):
         yield bar.update
 
 
+class Clocked:
+    """Progress bars that keep the time per step of the last run (none if it was read from disk)."""
+
+    def __init__(self):
+        self.seconds: list[float] = []
+
+    def take(self) -> list[float]:
+        """The times since they were last taken."""
+        taken, self.seconds = self.seconds, []
+        return taken
+
+    @contextmanager
+    def progress(self, label, total, done):
+        self.seconds = []  # of this run only
+        last = None
+        with progress(label, total, done) as report:
+
+            def mark(steps):
+                nonlocal last
+                now = clock.perf_counter()
+                if last is not None:  # the first part would count compilation
+                    self.seconds.append((now - last) / steps)
+                last = now
+                report(steps)
+
+            yield mark
+
+
 def tell(message: str) -> None:
     """A line of progress on stderr."""
     print(message, file=sys.stderr, flush=True)

@@ -5,8 +5,9 @@
 The run is kept in a folder: the same command goes on where it was cut short. From its snapshots:
 the bulk velocity of the channel and the Reynolds number that it makes with the cavity's length, the
 frequency of the vertical velocity in the cavity's mouth, the time from which the kinetic energy,
-averaged over a period, changes by less than a percent from one period to the next, and how near
-particles come to walls.
+averaged over a period, changes by less than a percent from one period to the next, its trend over
+the second half of the run beside the viscous rate of the channel, and how near particles come to
+walls.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from jaxsph.environment import environment
 from jaxsph.interpolation import ShepardMap
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene, open_cavity
-from jaxsph.scenes.open_cavity import CAVITY_LENGTH
+from jaxsph.scenes.open_cavity import CAVITY_LENGTH, CHANNEL_HEIGHT
 from jaxsph_rom.study import full_run
 
 from .measure import near_walls, number, progress, write_json
@@ -110,6 +111,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "strouhal_number": None if frequency is None else frequency * CAVITY_LENGTH / speed,
         "mouth_velocity_rms": float(np.std(mouth[late])),
         "settled_from": settling_time(trajectory.time, energy, frequency, _SETTLED),
+        "energy_trend_percent_per_second": 100.0 * trend(trajectory.time[late], energy[late]),
+        "viscous_trend_percent_per_second": -200.0 * viscosity[1] * (np.pi / CHANNEL_HEIGHT) ** 2,
         "energy_change_in_last_second_percent": _change(trajectory.time, energy),
         **near_walls(scene, trajectory),
         "time": trajectory.time,
@@ -185,6 +188,11 @@ def settling_time(
     return None if first >= len(change) else float(time[first])
 
 
+def trend(time: np.ndarray, values: np.ndarray) -> float:
+    """Relative change per second: the slope of a straight line through them, over their mean."""
+    return float(np.polyfit(time, values, 1)[0] / values.mean())
+
+
 def _change(time: np.ndarray, energy: np.ndarray) -> float:
     """Relative change [%] of the mean energy from the second before the last to the last."""
     last, before = time > time[-1] - 1.0, (time > time[-1] - 2.0) & (time <= time[-1] - 1.0)
@@ -202,6 +210,8 @@ def _text(results: dict[str, Any]) -> str:
         ("shedding", f"{number(results['shedding_frequency'])} Hz, "
          f"Strouhal number {number(results['strouhal_number'])}"),
         ("settled from", f"{number(results['settled_from'])} s"),
+        ("trend", f"{number(results['energy_trend_percent_per_second'])} % of the kinetic energy a "
+         f"second; viscous {number(results['viscous_trend_percent_per_second'])}"),
         ("kinetic energy", f"{number(results['energy_change_in_last_second_percent'])} % in the "
          "last second"),
         ("nearest to a wall", f"{number(results['nearest_to_wall_over_dx'])} dx"),

@@ -13,8 +13,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
-import time as clock
-from contextlib import contextmanager
 from fnmatch import fnmatch
 from functools import partial
 from pathlib import Path
@@ -48,10 +46,10 @@ from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.study import PLANS, Outcome, Plan
 
 from .measure import (
+    Clocked,
     format_rows,
     interacting_pairs,
     number,
-    progress,
     read_json,
     summary,
     tell,
@@ -192,7 +190,7 @@ def _run(path: Path, results, options, kind: Kind, wanted: list[Wanted]) -> None
     listed = name == "reconstructive" and options.inner_product not in energy
     if not left and not listed:
         return
-    clocked = _Clocked()
+    clocked = Clocked()
     plan = dataclasses.replace(PLANS[options.scene], borders=kind.borders)
     study = _study(options, plan, clocked)
     results |= _scene_record(study, kind.trained_on[0]) | {"environment": environment()}
@@ -220,7 +218,7 @@ def _place(case: dict[str, Any]) -> tuple:
     return case["inner_product"], kind, case["reynolds"], case["modes"], projection
 
 
-def _study(options, plan: Plan, clocked: _Clocked) -> Study:
+def _study(options, plan: Plan, clocked: Clocked) -> Study:
     folder = options.out or Path("out", f"paper-rom-{options.scene}-{options.scale}")
     settings = _settings(options)
     make = partial(
@@ -262,34 +260,6 @@ def _products(cases: list[Wanted]):
         by_both.setdefault((tuple(reynolds), modes), []).append(projection)
     for (reynolds, modes), projections in by_both.items():
         yield reynolds, modes, projections
-
-
-class _Clocked:
-    """Progress bars that keep the time per step of the last run (none if it was read from disk)."""
-
-    def __init__(self):
-        self.seconds: list[float] = []
-
-    def take(self) -> list[float]:
-        """The times since they were last taken."""
-        taken, self.seconds = self.seconds, []
-        return taken
-
-    @contextmanager
-    def progress(self, label, total, done):
-        self.seconds = []  # of this run only
-        last = None
-        with progress(label, total, done) as report:
-
-            def mark(steps):
-                nonlocal last
-                now = clock.perf_counter()
-                if last is not None:  # the first part would count compilation
-                    self.seconds.append((now - last) / steps)
-                last = now
-                report(steps)
-
-            yield mark
 
 
 def _record(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import (
+    cavity_options,
     lid_driven_cavity,
     open_cavity,
     plane_flows,
@@ -110,6 +111,24 @@ def test_frequency_and_settling_of_a_known_signal():
     assert found == pytest.approx(-np.log(0.01 * period / (1.0 - np.exp(-period)) ** 2), abs=0.1)
     assert open_cavity.settling_time(time, energy, None, 0.01) is None
     assert open_cavity.settling_time(time, np.exp(time), 1.0 / period, 0.01) is None
+
+
+def test_the_trend_of_a_decay():
+    time = np.linspace(0.0, 2.0, 101)
+    values = 3.0 * np.exp(-0.07 * time) * (1.0 + 0.01 * np.sin(2 * np.pi * 5.0 * time))
+    assert open_cavity.trend(time, values) == pytest.approx(-0.07, rel=0.05)
+
+
+@pytest.mark.slow
+def test_options_of_the_reduced_cavity(tmp_path, capsys):
+    path = tmp_path / "options.json"
+    arguments = ["--resolution", "14", "--end-time", "0.2", "--modes", "2",
+                 "--out", str(tmp_path / "runs"), "--json", str(path)]  # fmt: skip
+    assert cavity_options.main(arguments) == 0
+    rows = json.loads(path.read_text())["rows"]
+    assert len({(r["inner_product"], r["advection"], r["map"]) for r in rows}) == len(rows) == 8
+    assert all(0.0 < row["lasted"] <= 0.2 and row["velocity_peak_percent"] > 0.0 for row in rows)
+    assert "MovingLeastSquaresMap" in capsys.readouterr().out
 
 
 @pytest.mark.slow
