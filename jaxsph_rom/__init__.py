@@ -18,6 +18,8 @@ from .basis import projection_errors as projection_errors
 from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
 from .field_advection import PaperAdvection as PaperAdvection
+from .lattice_polynomials import LatticePolynomials as LatticePolynomials
+from .mode_interpolation import ModeInterpolation as ModeInterpolation
 from .model import ReducedModel as ReducedModel
 from .model import ReducedState as ReducedState
 from .projection import AdjointPetrovGalerkin as AdjointPetrovGalerkin

@@ -22,8 +22,8 @@ from jaxsph.scenes import Scene
 
 from .basis import Basis
 from .field_advection import Advection, PaperAdvection
+from .mode_interpolation import ModeInterpolation
 from .projection import Projection, PseudoInverse
-from .splines import LocalSplines
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
 
@@ -41,20 +41,20 @@ class ReducedModel(Model):
         d(w^)/dt = projection of f-bar(centre + Phi~(x) w^),    dx/dt = u~ + du~.
 
     As modes do not keep particles inside walls, those that come too near are put back after each
-    step. It runs in the full model's loop. At every stage the modes are carried to the particles by
-    local splines, so its cost is that of a full right-hand side and more.
+    step. It runs in the full model's loop. At every stage the modes are carried to the particles,
+    so its cost is that of a full right-hand side and more.
 
     Args:
         functional: f-bar, the Eulerian SPH functional.
         projection: `Galerkin()` or `AdjointPetrovGalerkin(tau)`.
-        splines: of `basis.functions`, ordered (field, function).
+        interpolation: of `basis.functions`, ordered (field, function).
         basis: the modes at the reference points, with centre and inner product.
         search: neighbour search.
     """
 
     functional: SPHFunctional
     projection: Projection
-    splines: LocalSplines
+    interpolation: ModeInterpolation
     basis: Basis
     search: NeighborSearch | WalledSearch
 
@@ -63,7 +63,7 @@ class ReducedModel(Model):
         cls,
         scene: Scene,
         basis: Basis,
-        splines: LocalSplines,
+        interpolation: ModeInterpolation,
         projection: Projection,
         advection: Advection | None = None,
         margin: float | None = None,
@@ -71,12 +71,12 @@ class ReducedModel(Model):
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's.
 
         Raises:
-            ValueError: if the splines are not of `basis.functions`.
+            ValueError: if the interpolation is not of `basis.functions`.
         """
-        wanted, found = basis.functions[0].size, splines.linear_weights.shape[2]
+        wanted, found = basis.functions[0].size, interpolation.functions
         if found != wanted:
             raise ValueError(
-                f"splines: of {found} functions, but the basis has {wanted}; fit them to "
+                f"interpolation: of {found} functions, but the basis has {wanted}; fit them to "
                 "`basis.functions`."
             )
         advection = PaperAdvection() if advection is None else advection
@@ -94,14 +94,14 @@ class ReducedModel(Model):
                 for a in (basis.modes, basis.centre, basis.weights)
             ),
         )
-        return cls(functional, projection, splines, basis, scene.search(margin=margin))
+        return cls(functional, projection, interpolation, basis, scene.search(margin=margin))
 
     def basis_at(
         self, position: Array
     ) -> tuple[Float[Array, "particles fields modes"], Float[Array, "#particles fields"]]:
         """Phi~(x) and the centre at particle positions."""
         fields = self.basis.modes.shape[1]
-        return self.basis.parts(self.splines(position).reshape(position.shape[0], fields, -1))
+        return self.basis.parts(self.interpolation(position).reshape(position.shape[0], fields, -1))
 
     def pseudo_inverse(self, modes: Array) -> PseudoInverse:
         """Phi~^+ in the basis' inner product."""
@@ -172,7 +172,7 @@ class ReducedModel(Model):
             (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), -1),
             *wall_checks(self.functional.walls, position),
             *list_checks(self.search, auxiliary, position),
-            (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(position), -1),
+            (FaultCode.SPLINE_CELL_OVERFLOW, self.interpolation.overflow(position), -1),
         )
 
     def enlarged(self):

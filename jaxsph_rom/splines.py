@@ -6,10 +6,12 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from jaxsph import CellGrid, Space
 from jaxsph.chunks import chunked_map
+
+from .mode_interpolation import ModeInterpolation
 
 _BLOCK = 500_000  # particle-node pairs evaluated at a time
 
@@ -23,7 +25,7 @@ def polyharmonic(squared: Array, order: int) -> Array:
     return jnp.where(positive, value, 0.0)
 
 
-class LocalSplines(eqx.Module):
+class LocalSplines(ModeInterpolation):
     """Functions interpolated by one polyharmonic spline per cell (paper, eqs. PSI, section 3.2):
 
         phi(x) = sum_j xi_j gamma(|x - x_j|) + eta . (1, x),
@@ -41,6 +43,12 @@ class LocalSplines(eqx.Module):
     grid: CellGrid = eqx.field(static=True)
     order: int = eqx.field(static=True)
     capacity: int = eqx.field(static=True)
+
+    @classmethod
+    def check(cls, points, space, order):
+        """A ValueError for an order below 1."""
+        if order < 1:
+            raise ValueError(f"order: a polyharmonic spline needs k >= 1, got {order}.")
 
     @classmethod
     def fit(
@@ -63,8 +71,7 @@ class LocalSplines(eqx.Module):
         Raises:
             ValueError: for an order below 1, or a cell neighbourhood with too few points.
         """
-        if order < 1:
-            raise ValueError(f"order: a polyharmonic spline needs k >= 1, got {order}.")
+        cls.check(points, space, order)
         box = space.box
         grid = CellGrid.with_width(box, space.support)
         points, values = np.asarray(points), np.asarray(values)
@@ -115,22 +122,28 @@ class LocalSplines(eqx.Module):
             capacity,
         )
 
-    def select(self, functions) -> LocalSplines:
-        """The splines of some of the functions, by number; nothing is solved again."""
-        return eqx.tree_at(
-            lambda s: (s.node_weights, s.linear_weights),
-            self,
-            (self.node_weights[:, :, functions], self.linear_weights[:, :, functions]),
-        )
+    @property
+    def box(self):
+        return self.grid.box
 
-    def overflow(self, position: Float[Array, "particles dim"]) -> Bool[Array, ""]:
-        """Whether a cell holds more particles than there is room for."""
+    @property
+    def functions(self):
+        return self.linear_weights.shape[2]
+
+    def combined(self, matrix):
+        return self._of(self.node_weights @ matrix, self.linear_weights @ matrix)
+
+    def select(self, functions):
+        return self._of(self.node_weights[:, :, functions], self.linear_weights[:, :, functions])
+
+    def _of(self, node_weights, linear_weights) -> LocalSplines:
+        weights = node_weights, linear_weights
+        return eqx.tree_at(lambda s: (s.node_weights, s.linear_weights), self, weights)
+
+    def overflow(self, position):
         return self.grid.bin(position, self.capacity).overflow
 
-    def __call__(
-        self, position: Float[Array, "particles dim"]
-    ) -> Float[Array, "particles functions"]:
-        """The functions at particles; meaningless if `overflow` is true."""
+    def __call__(self, position):
         box, dim = self.grid.box, self.grid.box.dim
         bins = self.grid.bin(position, self.capacity)
         padded = jnp.pad(position[bins.order], ((0, 1), (0, 0)))

@@ -10,9 +10,11 @@ import jax
 
 from jaxsph.cli import fail, positive_float, positive_int
 from jaxsph.integrate import SimulationError
+from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
 from jaxsph.io import check_target
 
 from ..field_advection import ConsistentAdvection, PaperAdvection
+from ..lattice_polynomials import LatticePolynomials
 from ..projection import (
     AdjointPetrovGalerkin,
     ConvectiveMemory,
@@ -21,6 +23,7 @@ from ..projection import (
     SpectralMemory,
 )
 from ..report import format_table
+from ..splines import LocalSplines
 from ..study import Outcome, Plan, Study, TensorStudy, write_study
 from .options import (
     PRODUCTS,
@@ -36,6 +39,8 @@ from .options import (
     scene_maker,
 )
 
+MAPS = {"shepard": ShepardMap, "mls": MovingLeastSquaresMap}
+INTERPOLATIONS = {"splines": LocalSplines, "polynomials": LatticePolynomials}
 ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
 PROJECTIONS = ("galerkin", "apg")
 HYPER = ("none", "tensor")
@@ -73,8 +78,14 @@ def add_to(commands) -> None:
         f"({defaults('tau')})")  # fmt: skip
     add("--advection", choices=tuple(ADVECTIONS), default="paper",
         help="what is subtracted for the Eulerian functional (default: %(default)s)")  # fmt: skip
+    add("--map", choices=tuple(MAPS), default="shepard",
+        help="of particles to reference points: Shepard's, or moving least squares, which keep "
+        "linear fields at walls (default: %(default)s)")  # fmt: skip
+    add("--interpolation", choices=tuple(INTERPOLATIONS), default="splines",
+        help="of modes at moving particles: local polyharmonic splines, or polynomials where "
+        "particles start on a lattice, which cost less (default: %(default)s)")  # fmt: skip
     add("--spline-order", type=positive_int, default=3, metavar="K",
-        help="of the polyharmonic splines (default: %(default)s)")  # fmt: skip
+        help="of the splines or polynomials (default: %(default)s)")  # fmt: skip
     add_closure_options(add, default="none")
     add("--slice", type=float, dest="slice_at", metavar="X",
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
@@ -165,6 +176,8 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         product=PRODUCTS[options.inner_product](),
         advection=ADVECTIONS[options.advection](),
         spline_order=options.spline_order,
+        rule=MAPS[options.map],
+        interpolation=INTERPOLATIONS[options.interpolation],
         progress=bar,
         probes=plan.probes,
         judged_from=plan.judged_from,

@@ -17,6 +17,8 @@ from jaxsph.interpolation import KernelMap, MovingLeastSquaresMap
 from jaxsph.scenes import Scene
 
 from ..basis import Basis, Centring, Energy, InnerProduct, pod
+from ..lattice_polynomials import LatticePolynomials, on_lattice
+from ..mode_interpolation import ModeInterpolation
 from ..reference import ReferenceSpace
 from ..splines import LocalSplines
 from .energy_bound import EnergyBound
@@ -142,7 +144,7 @@ class ReducedFlow(eqx.Module):
     ) -> Trajectory:
         """Fields at the times of the coordinates, at the reference points or at others.
 
-        Other points get the modes by local splines, exact at the reference points: what was
+        Other points get the modes by interpolation that is exact at the reference points: what was
         smoothed once by the map is not smoothed again.
 
         Raises:
@@ -175,17 +177,24 @@ class ReducedFlow(eqx.Module):
         """Of these, the functions on the reference points."""
         return np.asarray(self.shown.functions).reshape(len(self.reference.points), -1)
 
-    def splines(self, **settings) -> LocalSplines:
-        """Of the functions, with settings as of `LocalSplines.fit`."""
+    def interpolation(self, margin: float = 1.3) -> ModeInterpolation:
+        """Of the functions: cubic polynomials where the reference points are a lattice, which costs
+        less and is as accurate (`benchmarks.mode_interpolation`), local splines elsewhere.
+
+        Args:
+            margin: room for particles per cell of splines, over the number in a full one.
+        """
         points, space = np.asarray(self.reference.points), self.reference.space
-        return LocalSplines.fit(points, self.functions, space, **settings)
+        if on_lattice(points, space):
+            return LatticePolynomials.fit(points, self.functions, space)
+        return LocalSplines.fit(points, self.functions, space, margin=margin)
 
     def _at(self, points) -> Float[Array, "places functions"]:
-        splines = self.splines()
+        interpolation = self.interpolation()
         points = jnp.asarray(points, self.reference.points.dtype)
-        if bool(splines.overflow(points)):
+        if bool(interpolation.overflow(points)):
             raise ValueError("points: too many in one cell of the splines; ask for some at a time.")
-        return splines(points)
+        return interpolation(points)
 
 
 @eqx.filter_jit

@@ -12,7 +12,7 @@ from jaxsph.integrate import Fault, FaultCode, Model
 from jaxsph.walls import Walls
 
 from ..basis import Basis
-from ..splines import LocalSplines
+from ..mode_interpolation import ModeInterpolation
 from .log_density import from_log_density
 from .recovery import Recovery
 from .reduced_flow import ReducedFlow
@@ -34,12 +34,13 @@ class TracerModel(Model):
 
         da/dt = f(a, nu),    dx/dt = u(x) = centre(x) + sum_m a_m phi_m(x),
 
-    the modes between the reference points by local splines. Tracers do not act on the flow. As
-    modes do not keep them inside walls, those that come too near are put back after each step.
+    the modes between the reference points as `ReducedFlow.interpolation` has them. Tracers do not
+    act on the flow. As modes do not keep them inside walls, those that come too near are put back
+    after each step.
 
     Args:
         flow: the model of the coordinates.
-        splines: of what fields are made of.
+        interpolation: of what fields are made of.
         shown: makes fields of it, the flow's basis or its recovery.
         fluid: gives densities their scale.
         spacing: of the reference points [m].
@@ -47,7 +48,7 @@ class TracerModel(Model):
     """
 
     flow: TensorModel
-    splines: LocalSplines
+    interpolation: ModeInterpolation
     shown: Basis | Recovery
     fluid: Fluid
     spacing: float = eqx.field(static=True)
@@ -56,8 +57,8 @@ class TracerModel(Model):
     @classmethod
     def of(cls, flow: ReducedFlow, viscosity: Array, walls: Walls | None = None) -> TracerModel:
         """The model of tracers in a flow at a viscosity [m^2/s]."""
-        splines, spacing = flow.splines(margin=_MARGIN), flow.reference.space.spacing
-        return cls(flow.model(viscosity), splines, flow.shown, flow.fluid, spacing, walls)
+        interpolation, spacing = flow.interpolation(margin=_MARGIN), flow.reference.space.spacing
+        return cls(flow.model(viscosity), interpolation, flow.shown, flow.fluid, spacing, walls)
 
     def fields_at(
         self,
@@ -65,15 +66,9 @@ class TracerModel(Model):
         coordinates: Float[Array, " modes"],
         wanted: slice = slice(None),
     ) -> Float[Array, "particles fields"]:
-        """(r, u), or what is wanted of it, at positions; the splines' weights are summed first."""
+        """(r, u), or what is wanted of it, at positions; the modes are summed first."""
         matrix, rest = (part[:, wanted] for part in self.shown.combination(coordinates))
-        weights = (self.splines.node_weights, self.splines.linear_weights)
-        of_flow = eqx.tree_at(
-            lambda s: (s.node_weights, s.linear_weights),
-            self.splines,
-            tuple(w @ matrix for w in weights),
-        )
-        return of_flow(position) + rest
+        return self.interpolation.combined(matrix)(position) + rest
 
     def prepare(self, state):
         return None
@@ -86,7 +81,7 @@ class TracerModel(Model):
         return TracerState(self.flow.rates(time, state.coordinates, None), velocity)
 
     def finish(self, state):
-        position = self.splines.grid.box.wrap(state.position)
+        position = self.interpolation.box.wrap(state.position)
         if self.walls is not None:
             position = self.walls.put_inside(position, _WALL_MARGIN * self.spacing)
         return TracerState(state.coordinates, position)
@@ -98,7 +93,7 @@ class TracerModel(Model):
             step,
             (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
             *wall_checks(self.walls, state.position),
-            (FaultCode.SPLINE_CELL_OVERFLOW, self.splines.overflow(state.position), -1),
+            (FaultCode.SPLINE_CELL_OVERFLOW, self.interpolation.overflow(state.position), -1),
         )
         lost = of_flow.code != int(FaultCode.NONE)
         return Fault(*(

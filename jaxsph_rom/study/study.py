@@ -21,6 +21,7 @@ from jaxsph.scenes import Scene
 
 from ..basis import Basis, Centring, Euclidean, InnerProduct, pod
 from ..field_advection import Advection, PaperAdvection
+from ..mode_interpolation import ModeInterpolation
 from ..model import ReducedModel, ReducedState
 from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projection
 from ..reference import ReferenceSpace, lagrangian_snapshots
@@ -70,12 +71,14 @@ class Study:
             projection with the memory length that it finds for each run.
         product: inner product of the POD and the projection; the paper's if none.
         advection: how the Eulerian functional is made; the paper's if none.
-        spline_order: of the polyharmonic splines.
+        spline_order: of the interpolation's splines or polynomials.
         progress: opens a progress bar for each run.
         probes: where runs are compared, (P, n) [m] from a scene; the centre line if none is given.
         judged_from: time [s] from which on peaks and medians are taken.
         centring: of the POD; the product's own if none.
         rule: of the map to the reference points; the paper's if none.
+        interpolation: of the modes, from the reference points back to particles; the paper's
+            `LocalSplines` if none, `LatticePolynomials` where particles start on a lattice.
     """
 
     def __init__(
@@ -91,6 +94,7 @@ class Study:
         judged_from: float = 0.0,
         centring: Centring | None = None,
         rule: type[KernelMap] = ShepardMap,
+        interpolation: type[ModeInterpolation] = LocalSplines,
     ):
         self.scene = cache(make)
         self.folder = Path(folder)
@@ -100,7 +104,7 @@ class Study:
         self.advection = PaperAdvection() if advection is None else advection
         self.spline_order = spline_order
         self.progress = silent if progress is None else progress
-        self.rule = rule
+        self.rule, self.interpolation = rule, interpolation
         self._probes = _centre_line if probes is None else probes
         self.judged_from = judged_from
         self.full = cache(self._full)
@@ -108,7 +112,7 @@ class Study:
         self.snapshots = cache(self._snapshots)
 
     def check(self, experiment: Experiment) -> None:
-        """Raise a ValueError if the experiment asks for more modes than it has snapshots."""
+        """A ValueError for more modes than snapshots, or an interpolation that does not fit."""
         available = 0
         for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
             scene = self.scene(reynolds)
@@ -120,6 +124,10 @@ class Study:
                     f"modes: {modes} asked for, but the training runs give {available} snapshots; "
                     "ask for fewer modes, a longer run or more training runs."
                 )
+
+        scene = self.scene(experiment.trained_on[0])
+        points = np.asarray(scene.state.position)
+        self.interpolation.check(points, scene.space, self.spline_order)
 
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)
@@ -166,14 +174,14 @@ class Study:
         values = basis.functions.reshape(len(points), -1)
         numbers = np.arange(values.shape[1]).reshape(basis.modes.shape[1], -1)
         space = self.scene(experiment.trained_on[0]).space
-        splines = LocalSplines.fit(points, values, space, self.spline_order)
+        interpolation = self.interpolation.fit(points, values, space, self.spline_order)
         for modes in experiment.modes:
             part = basis.truncated(modes)
             kept = np.delete(numbers, np.s_[modes : basis.size], axis=1).reshape(-1)
             for reynolds in experiment.reynolds:
                 for projection in self.projections:
                     yield self._reduced(
-                        experiment, reynolds, part, splines.select(kept), projection
+                        experiment, reynolds, part, interpolation.select(kept), projection
                     )
 
     @property
@@ -191,14 +199,16 @@ class Study:
             parts.append(self.advection.name)
         if self.rule is not ShepardMap:
             parts.append(self.rule.__name__.removesuffix("Map").lower())
+        if self.interpolation is not LocalSplines:
+            parts.append(self.interpolation.__name__.lower())
         return "-".join(parts)
 
-    def _reduced(self, experiment, reynolds, basis, splines, projection) -> Outcome:
+    def _reduced(self, experiment, reynolds, basis, interpolation, projection) -> Outcome:
         scene = self.scene(reynolds)
         memory = None
         if isinstance(projection, MemoryLength):
             memory = projection
-            projection = self._petrov_galerkin(memory, scene, basis, splines)
+            projection = self._petrov_galerkin(memory, scene, basis, interpolation)
         tau = float(projection.tau) if isinstance(projection, AdjointPetrovGalerkin) else None
         trained = "-".join(f"{r:g}" for r in experiment.trained_on)
         name = projection.name if tau is None else f"{projection.name}-{tau:g}"
@@ -214,6 +224,7 @@ class Study:
                 "advection": self.advection.name,
                 "spline_order": self.spline_order,
                 "map": self.rule.__name__,
+                "interpolation": self.interpolation.__name__,
             },
         )
 
@@ -229,7 +240,9 @@ class Study:
             run = recorded_run(
                 path,
                 recorded,
-                lambda: ReducedModel.of_scene(scene, basis, splines, projection, self.advection),
+                lambda: ReducedModel.of_scene(
+                    scene, basis, interpolation, projection, self.advection
+                ),
                 lambda model: eqx.filter_jit(model.project)(scene.state),
                 restore,
                 f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
@@ -240,8 +253,8 @@ class Study:
         memory = None if memory is None else memory.label
         return self._compare(experiment, reynolds, basis, projection, tau, memory, run, fault)
 
-    def _petrov_galerkin(self, memory, scene, basis, splines) -> AdjointPetrovGalerkin:
-        model = ReducedModel.of_scene(scene, basis, splines, Galerkin(), self.advection)
+    def _petrov_galerkin(self, memory, scene, basis, interpolation) -> AdjointPetrovGalerkin:
+        model = ReducedModel.of_scene(scene, basis, interpolation, Galerkin(), self.advection)
         tau = memory(model, eqx.filter_jit(model.project)(scene.state))
         # rounded, so that a run that is taken up again finds the very number that it recorded
         return AdjointPetrovGalerkin(jnp.asarray(float(f"{tau:.4g}"), scene.state.density.dtype))

@@ -64,6 +64,8 @@ def write_study(
         "bases": bases,
         "parameters": first.parameters,
         "advection": study.advection.name,
+        "map": study.rule.__name__,
+        "interpolation": study.interpolation.__name__,
         "spline_order": study.spline_order,
         "judged_from": study.judged_from,
     }

@@ -43,7 +43,7 @@ def test_the_figure(tmp_path):
 def test_all_families(tmp_path, capsys):
     path, image = tmp_path / "r.json", tmp_path / "f.png"
     arguments = ["--resolution", "48", "--end-time", "0.05", "--modes", "2", "--iterations", "10",
-                 "--out", str(tmp_path / "o"), "--json", str(path), "--figure", str(image)]  # fmt: skip
+                 "--out", str(tmp_path), "--json", str(path), "--figure", str(image)]  # fmt: skip
     assert error_against_time.main(arguments) == 0
     read = json.loads(path.read_text())
     assert {r["family"] for r in read["rows"]} == set(error_against_time.MARKS)

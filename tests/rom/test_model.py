@@ -193,8 +193,8 @@ def test_the_rates_do_not_depend_on_the_centre(scene, disturbed):
     scale = np.abs(found[0].coordinates).max()
     np.testing.assert_allclose(found[1].coordinates, found[0].coordinates, atol=1e-7 * scale)
     np.testing.assert_allclose(found[1].position, found[0].position, atol=1e-8)
-    with pytest.raises(ValueError, match="splines: of 12 functions, but the basis has 15"):
-        ReducedModel.of_scene(scene, basis, models[0].splines, Galerkin())
+    with pytest.raises(ValueError, match="interpolation: of 12 functions, but the basis has 15"):
+        ReducedModel.of_scene(scene, basis, models[0].interpolation, Galerkin())
 
 
 def test_the_pseudo_inverse_is_weighted_least_squares():
