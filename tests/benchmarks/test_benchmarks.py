@@ -101,6 +101,7 @@ def test_reduced_models_are_taken_up_again(tmp_path, capsys):
     assert "other settings" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_reduced_open_cavity_settles_first(tmp_path):
     path, out = tmp_path / "rom.json", tmp_path / "out"
     same = ["open-cavity", "--resolution", "32", "--end-time", "0.02", "--settling", "0.02"]

@@ -1,6 +1,7 @@
 """Reduced models between walls: the full model's wall rule, particles kept inside, local bases."""
 
 import json
+from importlib import import_module
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,6 +11,7 @@ import pytest
 from jaxsph import ParticleState, SPHFunctional
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import NoSlip, WallPressure
+from jaxsph.io import read_trajectory
 from jaxsph.metrics import vertical_slice
 from jaxsph.scenes import couette, lid_driven_cavity, open_cavity
 from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, PaperAdvection, ReducedModel
@@ -141,6 +143,24 @@ def test_a_settled_start_goes_on_from_the_run_from_rest(tmp_path):
     again = settled(make, 0.05, tmp_path, silent)(2400.0)
     np.testing.assert_array_equal(again.state.position, scene.state.position)
     assert stamp == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.h5")}
+
+
+@pytest.mark.slow
+def test_most_of_the_settling_runs_at_half_the_resolution(tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("jaxsph_rom.study.settled"), "_COARSEST", 24)
+
+    def make(reynolds, resolution=48, start_time=0.0, end_time=0.004, **more):
+        return open_cavity(resolution, reynolds, start_time=start_time, end_time=end_time, **more)
+
+    scene = settled(make, 0.05, tmp_path, silent)(2400.0)
+    coarse = tmp_path / "resolution-24" / "re-2400" / "trajectory.h5"
+    last = tmp_path / "re-2400" / "trajectory.h5"
+    assert read_trajectory(coarse).time[-1] == pytest.approx(0.04)
+    fine = read_trajectory(last)
+    assert fine.time[-1] == pytest.approx(0.01) and fine.particles == len(scene.state.density)
+    np.testing.assert_array_equal(fine.position[-1], scene.state.position)
+    before = np.linalg.norm(read_trajectory(coarse).velocity[-1], axis=1).mean()
+    assert np.linalg.norm(fine.velocity[0], axis=1).mean() == pytest.approx(before, rel=0.1)
 
 
 def test_local_bases_from_one_line(tmp_path, capsys):
