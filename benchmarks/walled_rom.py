@@ -28,7 +28,7 @@ from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.io import check_target
-from jaxsph.metrics import probe, relative_discrepancy
+from jaxsph.metrics import phase_error, probe, relative_discrepancy
 from jaxsph.scenes import SCENES, Scene
 from jaxsph_rom import low_pass
 from jaxsph_rom.hyper import (
@@ -234,6 +234,9 @@ def _judged(
         ):  # fmt: skip
             fields = flow.fields(values, run.time, points)
             ours = np.linalg.norm(fields.velocity, axis=2), fields.pressure
+            if scene.parameters.get("start_time") and place == "line":  # it goes on for ever
+                degrees, frequency = phase_error(run.time, wanted[0], ours[0])
+                row |= {f"{prefix}phase_error_degrees": degrees, "frequency": frequency}
             for name, a, b in zip(("velocity", "pressure"), wanted, ours, strict=True):
                 percent = relative_discrepancy(a, b)
                 row |= _figures(f"{prefix}{name}_on_{place}", percent, late)
@@ -259,8 +262,8 @@ def _offline(trained: TrainedFlow) -> dict[str, Any]:
 
 def _table(results: dict[str, Any]) -> str:
     header = ("Re", "M", "formulation", "closure", "u line %", "u all %", "p line %", "median",
-              "floor", "p all %", "median", "floor", "sound", "median", "full s", "reduced ms",
-              "stable")  # fmt: skip
+              "floor", "p all %", "median", "floor", "sound", "median", "phase deg", "full s",
+              "reduced ms", "stable")  # fmt: skip
     rows = []
     for row in results["rows"]:
         seconds = row["rom_seconds"]["median"]
@@ -272,7 +275,7 @@ def _table(results: dict[str, Any]) -> str:
                 "pressure_on_points_peak", "pressure_on_points_median",
                 "floor_pressure_on_points_median", "sound_on_points_peak",
                 "sound_on_points_median")),
-            number(row["fom_seconds"]), number(None if seconds is None else 1e3 * seconds),
+            number(row.get("phase_error_degrees")), number(row["fom_seconds"]), number(None if seconds is None else 1e3 * seconds),
             "yes" if row["stable"] else "no",
         ))  # fmt: skip
     start = results["settings"]["judged_from"]

@@ -33,6 +33,29 @@ def relative_discrepancy(
         return np.where(apart == 0.0, 0.0, 100.0 * apart / spread)
 
 
+def phase_error(
+    time: Float[np.ndarray, " times"],
+    reference: Float[np.ndarray, "times probes"],
+    values: Float[np.ndarray, "times probes"],
+) -> tuple[float, float]:
+    """By how much an oscillation on probes is ahead [degrees], and its frequency [Hz].
+
+    The angle of the cross-spectrum, summed over the probes and windowed (Hann), at the frequency
+    where the reference has most power.
+
+    Raises:
+        ValueError: for fewer than four evenly spaced times.
+    """
+    every = np.diff(time)
+    if len(time) < 4 or not np.allclose(every, every[0], rtol=1e-3):
+        raise ValueError("time: a phase needs four evenly spaced times or more.")
+    window = np.hanning(len(time))[:, None]
+    ours, theirs = (np.fft.rfft((a - a.mean(axis=0)) * window, axis=0) for a in (values, reference))
+    strongest = 1 + int(np.argmax((np.abs(theirs[1:]) ** 2).sum(axis=1)))
+    cross = (ours[strongest] * theirs[strongest].conj()).sum()
+    return float(np.degrees(np.angle(cross))), float(strongest / (len(time) * every[0]))
+
+
 def probe_line(space: Space, axis: int, through: tuple[float, ...], count: int) -> np.ndarray:
     """(count, n) evenly spaced probes [m] along an axis of the box, through a given point."""
     lower, length = space.box.lower[axis], space.box.lengths[axis]
