@@ -275,8 +275,8 @@ def _table(results: dict[str, Any]) -> str:
                 "pressure_on_points_peak", "pressure_on_points_median",
                 "floor_pressure_on_points_median", "sound_on_points_peak",
                 "sound_on_points_median")),
-            number(row.get("phase_error_degrees")), number(row["fom_seconds"]), number(None if seconds is None else 1e3 * seconds),
-            "yes" if row["stable"] else "no",
+            number(row.get("phase_error_degrees")), number(row["fom_seconds"]),
+            number(None if seconds is None else 1e3 * seconds), "yes" if row["stable"] else "no",
         ))  # fmt: skip
     start = results["settings"]["judged_from"]
     return f"discrepancies from t = {start:g} s, {results['particles']} particles\n" + format_rows(
