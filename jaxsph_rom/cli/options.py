@@ -51,7 +51,8 @@ def add_closure_options(add, default: str) -> None:
     """How models on reference points are formulated and closed."""
     add("--formulation", choices=FORMULATIONS,
         help="of models on reference points: the compressible equations as they are, or solenoidal "
-        "modes with the pressure recovered (default: solenoidal between walls)")  # fmt: skip
+        "modes with the pressure recovered (default: solenoidal between walls "
+        "without a closure)")  # fmt: skip
     add("--closure", choices=CLOSURES, default=default,
         help="of models on reference points (default: %(default)s)")  # fmt: skip
     add("--held-back", type=positive_float, metavar="RE",

@@ -78,7 +78,8 @@ def _train(options) -> int:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
         made_as = formulation(options)
         if made_as is None:
-            made_as = formulation_for(scenes[0], PRODUCTS[options.inner_product]())
+            product = PRODUCTS[options.inner_product]()
+            made_as = formulation_for(scenes[0], product, closed=closure is not None)
         (trained,) = train_flows(scenes, runs, (options.modes,), made_as, closure, bar)
         trained = dataclasses.replace(
             trained,

@@ -123,9 +123,13 @@ class Solenoidal(Formulation):
         return eqx.tree_at(lambda f: f.recovery, flow, recovery, is_leaf=lambda x: x is None)
 
 
-def formulation_for(scene: Scene, product: InnerProduct) -> Formulation:
-    """What suits a scene: solenoidal modes between walls, else the equations as they are."""
-    return Compressible(product) if scene.walls is None else Solenoidal()
+def formulation_for(scene: Scene, product: InnerProduct, closed: bool) -> Formulation:
+    """What suits a scene (`benchmarks.walled_rom`).
+
+    Between walls and without a closure pressure is better by solenoidal modes; with one it is
+    best by the equations as they are.
+    """
+    return Solenoidal() if scene.walls is not None and not closed else Compressible(product)
 
 
 def _predicted(

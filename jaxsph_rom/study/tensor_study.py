@@ -75,7 +75,8 @@ class TensorStudy:
     def _formulation(self, experiment: Experiment) -> Formulation:
         if self.formulation is not None:
             return self.formulation
-        return formulation_for(self.study.scene(experiment.trained_on[0]), self.study.product)
+        scene = self.study.scene(experiment.trained_on[0])
+        return formulation_for(scene, self.study.product, self.closed)
 
     def _closure(self, experiment: Experiment) -> LinearClosure:
         judge = held_back(experiment.trained_on) if self.judge is None else self.judge
