@@ -267,6 +267,8 @@ def figure(rows: list[dict[str, Any]], path: Path) -> Path:
     for axes, (name, title) in zip(panels, names, strict=True):
         dress(axes, "run time [s]", "error against the exact solution [%]", title)
         axes.set(xscale="log", yscale="log")
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("{x:g}")
         for family, (color, marker) in MARKS.items():
             of_family = [r for r in rows if r["family"] == family and r["seconds"] is not None]
             points = [(r["seconds"], r[name], _label(r)) for r in of_family]
@@ -279,8 +281,8 @@ def figure(rows: list[dict[str, Any]], path: Path) -> Path:
             )  # fmt: skip
             for at_x, at_y, label in points:
                 axes.annotate(
-                    label, (at_x, at_y), textcoords="offset points", xytext=(6, 4), color=color,
-                    fontsize=7.5,
+                    label, (at_x, at_y), textcoords="offset points", color=color, fontsize=7.5,
+                    xytext=(-3, -13) if family == TENSOR else (5, 5),
                 )  # fmt: skip
     legend_below(made, list(handles.values()))
     return save(made, path)
