@@ -119,7 +119,12 @@ def distinct(values) -> tuple[float, ...]:
 
 
 def scene_maker(
-    options, plan: Plan, reynolds: tuple[float, ...], folder: Path, on_points: bool
+    options,
+    plan: Plan,
+    reynolds: tuple[float, ...],
+    folder: Path,
+    on_points: bool,
+    check: Callable[[Scene], None] | None = None,
 ) -> Callable[[float], Scene]:
     """The scene as a function of the Reynolds number; bad input is met before the packing.
 
@@ -131,6 +136,7 @@ def scene_maker(
         on_points: whether models on reference points are made of the runs. Flows without walls
             then start from stirred particles at a balanced pressure, and a force that changes with
             time is refused.
+        check: what else must hold of the scene, with its particles on a lattice.
     """
     make = SCENES[options.scene]
     settings = {
@@ -150,6 +156,8 @@ def scene_maker(
         plan.probes(cheap)
     if on_points:
         check_steady(cheap, cheap.state.position)
+    if check is not None:
+        check(cheap)
     start_quiet = on_points and cheap.walls is None
     arrangement = options.arrangement or ("stirred" if start_quiet else None)
     if arrangement is not None or options.seed is not None:

@@ -12,6 +12,7 @@ from jaxsph.cli import fail, positive_float, positive_int
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
 from jaxsph.io import check_target
+from jaxsph.scenes import Scene
 
 from ..field_advection import ConsistentAdvection, PaperAdvection
 from ..lattice_polynomials import LatticePolynomials
@@ -169,15 +170,22 @@ def _study(options, plan: Plan, folder: Path) -> Study:
     if not isinstance(memory, MemoryLength):
         memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
     projections = {"galerkin": Galerkin(), "apg": memory}
+    interpolation = INTERPOLATIONS[options.interpolation]
+
+    def check(scene: Scene) -> None:
+        interpolation.check(scene.state.position, scene.space, options.spline_order)
+
     return Study(
-        scene_maker(options, plan, reynolds, folder, on_points="tensor" in options.hyper),
+        scene_maker(
+            options, plan, reynolds, folder, on_points="tensor" in options.hyper, check=check
+        ),
         folder,
         projections=tuple(projections[name] for name in distinct(options.projection)),
         product=PRODUCTS[options.inner_product](),
         advection=ADVECTIONS[options.advection](),
         spline_order=options.spline_order,
         rule=MAPS[options.map],
-        interpolation=INTERPOLATIONS[options.interpolation],
+        interpolation=interpolation,
         progress=bar,
         probes=plan.probes,
         judged_from=plan.judged_from,
