@@ -18,7 +18,9 @@ def make_space(side, dim=2, lengths=None, periodic=True):
     return Space(box, WendlandC2(), 2.0 / side, 1.0 / side)
 
 
-@pytest.mark.parametrize("dim, side, apart", [(2, 24, 0.5), (3, 10, 0.35)])
+@pytest.mark.parametrize(
+    "dim, side, apart", [(2, 24, 0.5), pytest.param(3, 10, 0.35, marks=pytest.mark.slow)]
+)
 def test_particles_are_even_but_not_on_a_lattice(dim, side, apart):
     space = make_space(side, dim)
     x = np.asarray(Stirred().positions(space))

@@ -56,6 +56,7 @@ def test_right_hand_side(tmp_path, capsys):
     assert "vjp" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_convergence_is_taken_up_again(tmp_path, capsys):
     path = tmp_path / "convergence.json"
     same = ["--end-time", "0.05", "--arrangement", "lattice", "--json", str(path)]
@@ -189,6 +190,7 @@ def test_tensor_models_are_taken_up_again(tmp_path, capsys):
     assert "other settings" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_tensor_models_of_any_size_keep_their_energy(tmp_path, capsys):
     path = tmp_path / "stability.json"
     arguments = ["--resolution", "24", "--end-time", "0.05", "--modes", "3", "--json", str(path)]
@@ -224,6 +226,7 @@ def test_sampled_models_come_nearer_with_more_samples(tmp_path, capsys):
     assert sampled_rom.main([*same, "--reynolds", "100"]) == 2
 
 
+@pytest.mark.slow
 def test_a_sweep_beside_single_runs_and_full_ones(tmp_path, capsys):
     path = tmp_path / "sweep.json"
     arguments = ["--resolution", "24", "--end-time", "0.05", "--members", "30", "--modes", "2"]

@@ -1,5 +1,6 @@
 """From full runs to a reduced flow on reference points and back to fields."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -42,8 +43,12 @@ def test_fields_at_other_points_are_exact_at_the_reference_points(flow_and_run):
     np.testing.assert_allclose(found.velocity, everywhere.velocity[:, 5:90:7], atol=1e-9)
     np.testing.assert_allclose(found.density, everywhere.density[:, 5:90:7], atol=1e-7)
     crowd = np.full((500, 2), 0.5)
+    together = flow.fields(coordinates, np.arange(2.0), crowd).velocity
+    alone = flow.fields(coordinates, np.arange(2.0), crowd[:1]).velocity
+    np.testing.assert_array_equal(together, np.broadcast_to(alone, together.shape))
+    by_splines = eqx.tree_at(lambda f: f.reference.points, flow, flow.reference.points + 1e-3)
     with pytest.raises(ValueError, match="too many in one cell"):
-        flow.fields(coordinates, np.arange(2.0), crowd)
+        by_splines.fields(coordinates, np.arange(2.0), crowd)
 
 
 @pytest.mark.parametrize(
