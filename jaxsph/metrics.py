@@ -44,14 +44,17 @@ def phase_error(
     where the reference has most power.
 
     Raises:
-        ValueError: for fewer than four evenly spaced times.
+        ValueError: for fewer than four evenly spaced times, or a reference that does not oscillate.
     """
     every = np.diff(time)
     if len(time) < 4 or not np.allclose(every, every[0], rtol=1e-3):
         raise ValueError("time: a phase needs four evenly spaced times or more.")
     window = np.hanning(len(time))[:, None]
     ours, theirs = (np.fft.rfft((a - a.mean(axis=0)) * window, axis=0) for a in (values, reference))
-    strongest = 1 + int(np.argmax((np.abs(theirs[1:]) ** 2).sum(axis=1)))
+    power = (np.abs(theirs[1:]) ** 2).sum(axis=1)
+    if not power.max() > 0.0:
+        raise ValueError("reference: it does not oscillate, so it has no phase.")
+    strongest = 1 + int(np.argmax(power))
     cross = (ours[strongest] * theirs[strongest].conj()).sum()
     return float(np.degrees(np.angle(cross))), float(strongest / (len(time) * every[0]))
 

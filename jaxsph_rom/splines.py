@@ -61,12 +61,9 @@ class LocalSplines(ModeInterpolation):
     ) -> LocalSplines:
         """Factor each cell's system once and solve it for all functions (host, LAPACK).
 
-        Args:
-            points: reference points [m].
-            values: of the functions at the points.
-            space: cells are at least as wide as its kernel's support, 2h for Wendland's.
-            order: k of the polyharmonic function; 1, 2, 3, ...
-            margin: room for particles per cell, over the number in a full one.
+        Args as of `ModeInterpolation.fit`: cells are at least as wide as the kernel's support, 2h
+        for Wendland's, and the order is k of the polyharmonic function, 1, 2, 3, ...; `margin` is
+        the room for particles per cell, over the number in a full one.
 
         Raises:
             ValueError: for an order below 1, or a cell neighbourhood with too few points.

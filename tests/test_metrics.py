@@ -19,6 +19,12 @@ def test_a_wave_that_is_ahead():
     assert phase_error(time, wave(10.0), wave(10.0))[0] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_is_steady_has_no_phase():
+    time = np.linspace(0.0, 1.0, 11)
+    with pytest.raises(ValueError, match="does not oscillate"):
+        phase_error(time, np.full((11, 2), 3.0), np.ones((11, 2)))
+
+
 def test_a_phase_needs_even_times():
     with pytest.raises(ValueError, match="four evenly spaced times"):
         phase_error(np.array([0.0, 1.0, 2.0, 4.0]), np.zeros((4, 1)), np.zeros((4, 1)))

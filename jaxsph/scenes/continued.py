@@ -17,7 +17,8 @@ def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
     """The scene with the velocity and density of another run of it, at its own particles.
 
     A steady flow is reached sooner from the steady flow at a coarser resolution than from rest.
-    The fields are carried by first-order moving least squares (`MovingLeastSquaresMap`).
+    The fields are carried by first-order moving least squares (`MovingLeastSquaresMap`). The other
+    run's spacing is recorded among the parameters, so that no run from rest is taken for this one.
 
     Args:
         scene: whose particles are kept.
@@ -25,7 +26,8 @@ def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
         space: of the other run, which says how far its particles reach.
 
     Raises:
-        ValueError: if the runs are in different boxes, or the other run's particles have clumped.
+        ValueError: if the runs are in different boxes, or the other run's particles have clumped
+            or leave a place without any.
     """
     if space.box != scene.space.box:
         raise ValueError("box: the two runs are in different boxes; name a run of the same scene.")
@@ -34,5 +36,11 @@ def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
     values, overflow = eqx.filter_jit(carry)(state.position, fields)
     if bool(overflow):
         raise ValueError("state: its particles have clumped; name an earlier one.")
+    if not bool(jnp.isfinite(values).all()):
+        raise ValueError("state: it is lost or leaves a place without particles; name another one.")
     found = ParticleState(scene.state.position, values[:, 1:], values[:, 0])
-    return dataclasses.replace(scene, state=as_dtype(found, scene.state.density.dtype))
+    return dataclasses.replace(
+        scene,
+        state=as_dtype(found, scene.state.density.dtype),
+        parameters={**scene.parameters, "continued_from_spacing": space.spacing},
+    )

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from jaxsph.scenes import Scene, continued
 
-from .recorded_run import Progress, full_run, with_record
+from .recorded_run import Progress, full_run
 
 _SNAPSHOTS = 50  # kept of the time before
-_COARSEST = 80  # particles along the longest side; with fewer the flow would settle differently
+_COARSEST = 80  # particles along the longest side at half the resolution, at least
 _COARSE_SHARE = 0.8  # of the time that may run at half the resolution
 
 
@@ -50,7 +50,7 @@ def settled(
             coarse = before(reynolds, 0.0, changed, resolution=half)
             run = full_run(folder / f"resolution-{half}", coarse, progress)
             last = before(reynolds, changed, settling)
-            last = continued(with_record(last, continued_from=half), run.state(-1), coarse.space)
+            last = continued(last, run.state(-1), coarse.space)
         return dataclasses.replace(start, state=full_run(folder, last, progress).state(-1))
 
     return scene

@@ -27,7 +27,9 @@ def test_linear_fields_are_carried_exactly_up_to_the_walls():
     def velocity(x):
         return jnp.stack([x[:, 1] - 0.3, 2.0 * x[:, 0]], axis=1)
 
-    started = continued(fine, with_fields(coarse, density, velocity), coarse.space).state
+    scene = continued(fine, with_fields(coarse, density, velocity), coarse.space)
+    assert scene.parameters["continued_from_spacing"] == coarse.space.spacing
+    started = scene.state
     np.testing.assert_array_equal(started.position, fine.state.position)
     np.testing.assert_allclose(started.density, density(fine.state.position), rtol=1e-12)
     np.testing.assert_allclose(started.velocity, velocity(fine.state.position), atol=1e-12)
@@ -42,3 +44,7 @@ def test_what_cannot_be_carried_is_refused():
     heap = dataclasses.replace(coarse.state, position=coarse.state.position * 0.0 + 0.5)
     with pytest.raises(ValueError, match="particles have clumped"):
         continued(fine, heap, coarse.space)
+    lower = coarse.state.position[:, 1] < 0.3
+    gap = ParticleState(*(a[lower] for a in vars(coarse.state).values()))
+    with pytest.raises(ValueError, match="leaves a place without particles"):
+        continued(fine, gap, coarse.space)
