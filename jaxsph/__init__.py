@@ -10,6 +10,7 @@ from . import scenes as scenes
 from .domain import Box as Box
 from .fluid import Fluid as Fluid
 from .fluid import LinearEquationOfState as LinearEquationOfState
+from .fluid import TaitEquationOfState as TaitEquationOfState
 from .full_model import FullModel as FullModel
 from .functional import SPHFunctional as SPHFunctional
 from .integrate import SimulationError as SimulationError
@@ -26,6 +27,7 @@ from .simulate import run_scene as run_scene
 from .simulate import simulate as simulate
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
+from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
 from .walls import MovingWall as MovingWall
 from .walls import Region as Region

@@ -19,6 +19,31 @@ class LinearEquationOfState(eqx.Module):
         return reference_density + pressure / sound_speed**2
 
 
+class TaitEquationOfState(eqx.Module):
+    """p = rho0 c0^2 / gamma [(rho / rho0)^gamma - 1] (Cole 1948; Monaghan 1994).
+
+    Agrees with the linear one to first order, and resists strong compression more.
+
+    Args:
+        exponent: gamma, 7 for water (static).
+    """
+
+    exponent: float = eqx.field(static=True, default=7.0)
+
+    def pressure(self, density: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Pressure [Pa] of a density [kg/m^3]."""
+        stiffness = reference_density * sound_speed**2 / self.exponent
+        return stiffness * ((density / reference_density) ** self.exponent - 1.0)
+
+    def density(self, pressure: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Density [kg/m^3] of a pressure [Pa] above -rho0 c0^2 / gamma; lower ones count as that
+        of half the reference density."""
+        stiffness = reference_density * sound_speed**2 / self.exponent
+        floor = 0.5**self.exponent
+        ratio = jnp.maximum(1.0 + pressure / stiffness, floor)
+        return reference_density * ratio ** (1.0 / self.exponent)
+
+
 class Fluid(eqx.Module):
     """A weakly compressible fluid.
 
@@ -32,7 +57,7 @@ class Fluid(eqx.Module):
     reference_density: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     sound_speed: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     reference_speed: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    equation_of_state: LinearEquationOfState = LinearEquationOfState()
+    equation_of_state: LinearEquationOfState | TaitEquationOfState = LinearEquationOfState()
 
     def pressure(self, density: Array) -> Array:
         """Pressure [Pa] of a density [kg/m^3] by the equation of state."""

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .integrate import FaultCode, Model, SimulationError, integrate
+from .integrate import Fault, FaultCode, Model, SimulationError, integrate
 from .trajectory import Snapshot, Trajectory
 
 _ENLARGEMENTS = 4  # of the neighbour list in one run, together a factor of two
@@ -74,10 +74,19 @@ def simulate(
 
     def record(step, snapshot):
         snapshot = jax.tree.map(np.asarray, snapshot)
+        particle = _lost(snapshot)
+        if particle is not None:
+            fault = Fault(FaultCode.NOT_FINITE, step, particle)
+            raise _failed(fault)
         records.append(snapshot)
         times.append(step * time_step)
         if recorder is not None:
             recorder.append(step, step * time_step, snapshot)
+
+    def _failed(fault):
+        error = SimulationError(fault, time_step)
+        error.trajectory = trajectory() if records else None
+        return error
 
     def trajectory():
         stacked = jax.tree.map(lambda *a: np.stack(a), *records)
@@ -98,10 +107,10 @@ def simulate(
             metadata={**(metadata or {}), **timings},
         )
 
-    if first_step == 0:
-        record(0, model.observe(state))
     compile_seconds, run_seconds, step = 0.0, 0.0, first_step
     compiled, enlarged_at = False, []
+    if first_step == 0:
+        record(0, model.observe(state))
     while step < steps:
         start = clock.perf_counter()
         new, fault, snapshot = jax.block_until_ready(
@@ -123,15 +132,23 @@ def simulate(
                 enlarged_at.append(int(fault.step))
                 continue
         if int(fault.code) != FaultCode.NONE:
-            error = SimulationError(fault, time_step)
-            error.trajectory = trajectory() if records else None
-            raise error
+            raise _failed(fault)
         run_seconds += elapsed
         state, step = new, step + steps_per_snapshot
         record(step, snapshot)
         if progress is not None:
             progress(steps_per_snapshot)
     return trajectory()
+
+
+def _lost(snapshot: Snapshot) -> int | None:
+    """The first particle with a field that is not finite; -1 if only coordinates are not."""
+    fields = (snapshot.position, snapshot.velocity, snapshot.density, snapshot.pressure)
+    bad = np.any([~np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in fields], axis=0)
+    if bad.any():
+        return int(np.argmax(bad))
+    coordinates = snapshot.coordinates
+    return None if coordinates is None or np.isfinite(coordinates).all() else -1
 
 
 def run_scene(scene, **options) -> Trajectory:

@@ -18,6 +18,13 @@ class Arrangement(abc.ABC):
     def positions(self, space: Space) -> Float[Array, "particles dim"]:
         """Positions [m] that fill `space.box` at the spacing of `space`, outside jit."""
 
+    def places(self, space: Space) -> Float[Array, "particles dim"]:
+        """The places [m] that tell which particles belong to a part of the box: those of the
+        lattice, unless a rule has its own."""
+        from .lattice import Lattice  # a rule itself
+
+        return Lattice().positions(space)
+
     def record(self) -> dict:
         """The rule and its settings, JSON-like."""
         return {"rule": type(self).__name__, **asdict(self)}

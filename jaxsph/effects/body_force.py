@@ -36,6 +36,22 @@ class Gravity(BodyForce):
         return jnp.broadcast_to(self.vector[None, :], position.shape)
 
 
+class CentralForce(BodyForce):
+    """b = -Omega^2 (x - x_c): a pull towards a centre that grows with the distance.
+
+    Args:
+        frequency: Omega [rad/s].
+        center: x_c [m] (static).
+    """
+
+    frequency: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    center: tuple[float, ...] = eqx.field(static=True)
+
+    def acceleration(self, time, position):
+        center = jnp.asarray(self.center, position.dtype)[None, :]
+        return self.frequency**2 * (center - position)
+
+
 class KickAndHold(BodyForce):
     """The open cavity's drive along the first axis, inside a box from `lower` to `upper` (paper):
 

@@ -3,12 +3,19 @@
 from .balanced import balanced as balanced
 from .continued import continued as continued
 from .couette import couette as couette
+from .dam_break import dam_break as dam_break
+from .elliptic_drop import elliptic_drop as elliptic_drop
+from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity
 from .open_cavity import open_cavity as open_cavity
+from .oscillating_drop import oscillating_drop as oscillating_drop
 from .poiseuille import poiseuille as poiseuille
+from .rotating_square_patch import rotating_square_patch as rotating_square_patch
 from .scales import Scale as Scale
 from .scene import Scene as Scene
+from .shear_layer import shear_layer as shear_layer
+from .standing_wave import standing_wave as standing_wave
 from .taylor_green import taylor_green as taylor_green
 from .taylor_green import taylor_green_3d as taylor_green_3d
 
@@ -20,4 +27,11 @@ SCENES = {
     "couette": couette,
     "poiseuille": poiseuille,
     "hydrostatic-tank": hydrostatic_tank,
+    "dam-break": dam_break,
+    "elliptic-drop": elliptic_drop,
+    "gresho-vortex": gresho_vortex,
+    "oscillating-drop": oscillating_drop,
+    "rotating-square-patch": rotating_square_patch,
+    "shear-layer": shear_layer,
+    "standing-wave": standing_wave,
 }

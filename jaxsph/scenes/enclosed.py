@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 
 from ..arrangements import Arrangement, Lattice
@@ -23,14 +22,11 @@ from ..effects import (
     WallPressure,
     WallRepulsion,
 )
-from ..fluid import Fluid
-from ..kernels import Kernel, WendlandC2
-from ..pairs import Space
-from ..particles import ParticleState
+from ..kernels import Kernel
 from ..walls import MovingWall, Region, Walls
-from ..walls.walls import fill
+from .composed import composed, positive
 from .scales import Scale
-from .scene import Scene, as_dtype
+from .scene import Scene
 
 DELTA = 0.1  # of the density diffusion
 
@@ -83,24 +79,11 @@ def enclosed_flow(
     Raises:
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
-    positive(viscosity=viscosity, mach=mach, **{"t-end": end_time})
-    kernel = WendlandC2() if kernel is None else kernel
-    arrangement = Lattice() if arrangement is None else arrangement
-    dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
-    dx = (max(box.lengths) if side is None else side) / scale.resolution
-    space = Space(box, kernel, scale.h_over_dx * dx, dx)
-    space.check()
-    fluid = Fluid(*(
-        jnp.asarray(v, dtype) for v in (reference_density, reference_speed / mach, reference_speed)
-    ))  # fmt: skip
-    drive = None if force is None else force(dtype)
-    walls = Walls.around(fluid_region, space, moving, layers)
-    position = fill(fluid_region, Lattice().positions(space), arrangement.positions(space))
-    start = jnp.zeros(position.shape[0]) if pressure is None else pressure(position)
-    density = reference_density + start * (mach / reference_speed) ** 2
-    return Scene(
-        name=name,
-        effects=(
+    positive(viscosity=viscosity)
+
+    def effects(dtype) -> tuple[Effect, ...]:
+        drive = None if force is None else force(dtype)
+        return (
             Continuity(),
             PressureForce(),
             LaminarViscosity(jnp.asarray(viscosity, dtype)),
@@ -111,42 +94,22 @@ def enclosed_flow(
             WallPressure(drive),
             NoSlip() if wall_velocity is None else wall_velocity,
             WallRepulsion(fluid_region),
-        ),
-        fluid=fluid,
-        space=space,
-        state=as_dtype(ParticleState(position, jnp.zeros_like(position), density), dtype),
-        time_step=scale.time_step,
+        )
+
+    return composed(
+        name,
+        effects=effects,
+        box=box,
+        scale=scale,
         end_time=end_time,
-        steps_per_snapshot=scale.steps_per_snapshot,
-        parameters={
-            **parameters,
-            "resolution": scale.resolution,
-            "h_over_dx": scale.h_over_dx,
-            "time_step": scale.time_step,
-            "end_time": end_time,
-            "mach": mach,
-            "layers": layers,
-            "arrangement": arrangement.record(),
-            "kernel": type(kernel).__name__,
-            "dtype": str(dtype),
-        },
-        walls=jax.tree.map(lambda a: a.astype(dtype), walls),
+        reference_density=reference_density,
+        reference_speed=reference_speed,
+        mach=mach,
+        side=side,
+        walls=lambda space: Walls.around(fluid_region, space, moving, layers),
+        pressure=pressure,
+        arrangement=Lattice() if arrangement is None else arrangement,
+        kernel=kernel,
+        dtype=dtype,
+        parameters={**parameters, "layers": layers},
     )
-
-
-def pick_scale(scales: dict[str, Scale], scale: str) -> Scale:
-    """A scale by its name.
-
-    Raises:
-        ValueError: if there is no such scale.
-    """
-    if scale not in scales:
-        raise ValueError(f"scale: one of {', '.join(scales)}, got {scale!r}.")
-    return scales[scale]
-
-
-def positive(**values: float) -> None:
-    """Raise a ValueError that names the first value that is not positive."""
-    for name, value in values.items():
-        if not value > 0.0:
-            raise ValueError(f"{name}: must be positive, got {value:g}.")

@@ -10,7 +10,8 @@ from ..domain import Box
 from ..effects import KickAndHold
 from ..kernels import Kernel
 from ..walls import BoxRegion
-from .enclosed import enclosed_flow, pick_scale, positive
+from .composed import pick_scale, positive
+from .enclosed import enclosed_flow
 from .scales import Scale
 from .scene import Scene
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from ..arrangements import Arrangement, Packed
+from ..arrangements import Arrangement
 from ..domain import Box
 from ..effects import (
     Continuity,
@@ -14,13 +14,11 @@ from ..effects import (
     PressureForce,
     ShiftingTransport,
 )
-from ..fluid import Fluid
-from ..kernels import Kernel, WendlandC2
-from ..pairs import Space
-from ..particles import ParticleState
+from ..kernels import Kernel
 from . import taylor_green_solution as exact
+from .composed import composed, pick_scale, positive
 from .scales import Scale
-from .scene import Scene, as_dtype
+from .scene import Scene
 
 REFERENCE_DENSITY = 1000.0  # kg/m^3
 REFERENCE_SPEED = 1.0  # m/s
@@ -93,60 +91,43 @@ def _vortex(
     name, dim, scales, *, resolution, reynolds, scale, h_over_dx, time_step, end_time,
     arrangement, kernel, mach, dtype,
 ):  # fmt: skip
-    if scale not in scales:
-        raise ValueError(f"scale: one of {', '.join(scales)}, got {scale!r}.")
-    if not end_time > 0.0:
-        raise ValueError(f"t-end: must be positive, got {end_time:g} s.")
-    if not reynolds > 0.0:
-        raise ValueError(f"reynolds: must be positive, got {reynolds:g}.")
-    if not mach > 0.0:
-        raise ValueError(f"mach: must be positive, got {mach:g}.")
-    chosen = scales[scale].with_overrides(end_time, resolution, h_over_dx, time_step)
-    arrangement = Packed() if arrangement is None else arrangement
-    kernel = WendlandC2() if kernel is None else kernel
-    dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
-    dx = 1.0 / chosen.resolution
-    space = Space(Box.unit_periodic(dim), kernel, chosen.h_over_dx * dx, dx)
-    space.check()
-    viscosity = 1.0 / reynolds
-    fluid = Fluid(*(
-        jnp.asarray(v, dtype)
-        for v in (REFERENCE_DENSITY, REFERENCE_SPEED / mach, REFERENCE_SPEED)
-    ))  # fmt: skip
-    position = arrangement.positions(space)
-    if dim == 2:
-        velocity = exact.velocity(position, 0.0, viscosity)
-        pressure = exact.pressure(position, 0.0, viscosity, REFERENCE_DENSITY)
-    else:
-        velocity = exact.initial_velocity_3d(position)
-        pressure = exact.initial_pressure_3d(position, REFERENCE_DENSITY)
-    density = REFERENCE_DENSITY + pressure * (mach / REFERENCE_SPEED) ** 2
-    return Scene(
-        name=name,
-        effects=(
+    positive(reynolds=reynolds, mach=mach, **{"t-end": end_time})
+    chosen = pick_scale(scales, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
+    viscosity, density = 1.0 / reynolds, REFERENCE_DENSITY
+
+    def velocity(position):
+        if dim == 2:
+            return exact.velocity(position, 0.0, viscosity)
+        return exact.initial_velocity_3d(position)
+
+    def pressure(position):
+        if dim == 2:
+            return exact.pressure(position, 0.0, viscosity, density)
+        return exact.initial_pressure_3d(position, density)
+
+    def effects(dtype):
+        return (
             Continuity(),
             PressureForce(),
             LaminarViscosity(jnp.asarray(viscosity, dtype)),
             DensityDiffusion(jnp.asarray(0.1, dtype)),
             ParticleShifting(),
             ShiftingTransport(),
-        ),
-        fluid=fluid,
-        space=space,
-        state=as_dtype(ParticleState(position, velocity, density), dtype),
-        time_step=chosen.time_step,
+        )
+
+    return composed(
+        name,
+        effects=effects,
+        box=Box.unit_periodic(dim),
+        scale=chosen,
         end_time=end_time,
-        steps_per_snapshot=chosen.steps_per_snapshot,
-        parameters={
-            "scale": scale,
-            "resolution": chosen.resolution,
-            "reynolds": reynolds,
-            "h_over_dx": chosen.h_over_dx,
-            "time_step": chosen.time_step,
-            "end_time": end_time,
-            "mach": mach,
-            "arrangement": arrangement.record(),
-            "kernel": type(kernel).__name__,
-            "dtype": str(jnp.dtype(dtype)),
-        },
+        reference_density=density,
+        reference_speed=REFERENCE_SPEED,
+        mach=mach,
+        velocity=velocity,
+        pressure=pressure,
+        arrangement=arrangement,
+        kernel=kernel,
+        dtype=dtype,
+        parameters={"scale": scale, "reynolds": reynolds},
     )

@@ -70,6 +70,26 @@ class BoxRegion(Region):
 
 @final
 @dataclass(frozen=True)
+class BallRegion(Region):
+    """A disc or ball of a centre and a radius [m]."""
+
+    center: tuple[float, ...]
+    radius: float
+
+    def __post_init__(self):
+        object.__setattr__(self, "center", tuple(map(float, self.center)))
+        if not self.radius > 0.0:
+            raise ValueError(f"BallRegion: radius must be positive, got {self.radius:g} m.")
+
+    def signed_distance(self, position):
+        offset = position - jnp.asarray(self.center, position.dtype)[None, :]
+        squared = jnp.sum(offset * offset, axis=1)
+        apart = squared > 0.0  # the centre has no slope
+        return jnp.where(apart, jnp.sqrt(jnp.where(apart, squared, 1.0)), 0.0) - self.radius
+
+
+@final
+@dataclass(frozen=True)
 class SignedDistance(Region):
     """A region given by a function: positions (P, n) [m] -> signed distances (P,) [m].
 

@@ -96,6 +96,8 @@ def pod(
     """
     points, fields, times = snapshots.shape
     count = min(points * fields, times)
+    if count == 0:
+        raise ValueError(f"snapshots: there is none in {snapshots.shape}; record some.")
     if modes is not None and not 1 <= modes <= count:
         raise ValueError(
             f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; "

@@ -1,4 +1,4 @@
-"""The command line: `jaxsph-rom run`, `train` and `predict`."""
+"""The command line: `jaxsph-rom run`, `train`, `predict` and `advise`."""
 
 from .main import main as main
 from .options import PRODUCTS as PRODUCTS

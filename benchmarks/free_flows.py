@@ -1,0 +1,296 @@
+"""Flows with a free surface, shear layers and the Gresho vortex against what is known of them.
+
+    python -m benchmarks.free_flows --scenes dam-break standing-wave --resolutions 75 150
+
+One row per scene and resolution: the error against an exact solution, an experiment or a conserved
+quantity, beside the run's time. Every finished run's row is in the JSON file at once; the same
+command goes on where it was cut short. A run that ends in a fault is a row that names it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from scipy.optimize import curve_fit
+from scipy.spatial import cKDTree
+
+from jaxsph import SimulationError, Trajectory, run_scene
+from jaxsph.cli import positive_int, report_errors
+from jaxsph.environment import environment
+from jaxsph.io import check_target
+from jaxsph.scenes import SCENES, Scene
+from jaxsph.scenes.dam_break import GRAVITY
+from jaxsph.scenes.elliptic_drop import semi_axes
+from jaxsph.scenes.gresho_vortex import gresho_velocity
+from jaxsph.scenes.standing_wave import FREQUENCY, energy_decay
+
+from .measure import format_rows, number, progress, read_json, tell, write_json
+
+# Martin and Moyce (1952), table 2, n^2 = 2, a = 2 1/4 in: front Z = x / a at T = t (2 g / a)^1/2
+FRONT_TIME = (
+    0.41,
+    0.84,
+    1.19,
+    1.43,
+    1.63,
+    1.83,
+    1.98,
+    2.20,
+    2.32,
+    2.51,
+    2.65,
+    2.83,
+    2.98,
+    3.11,
+    3.33,
+)
+FRONT = (1.11, 1.22, 1.44, 1.67, 1.89, 2.11, 2.33, 2.56, 2.78, 3.00, 3.22, 3.44, 3.67, 3.89, 4.11)
+RESULTS = Path("benchmarks/results/free_flows.json")
+RESOLUTIONS = {
+    "dam-break": (75, 150),
+    "standing-wave": (40, 80),
+    "elliptic-drop": (25, 50),
+    "oscillating-drop": (40, 60),
+    "rotating-square-patch": (25, 50),
+    "shear-layer": (48, 96),
+    "gresho-vortex": (48, 96),
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 2: bad input."""
+    return report_errors("free_flows", _command, argv)
+
+
+def _command(argv) -> int:
+    options = _parser().parse_args(argv)
+    check_target(options.json, overwrite=True)
+    rows = (read_json(options.json) or {}).get("rows", [])
+    done = {(row["scene"], row["resolution"]) for row in rows}
+    with jax.enable_x64(True):
+        for name in options.scenes:
+            for resolution in options.resolutions or RESOLUTIONS[name]:
+                if (name, resolution) not in done:
+                    tell(f"{name}, resolution {resolution}")
+                    rows.append(run(name, resolution))
+                    write_json(options.json, {"rows": rows, **environment()})
+    print(_table(rows))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.free_flows", description=__doc__.partition("\n")[0]
+    )
+    add = parser.add_argument
+    names = tuple(RESOLUTIONS)
+    add("--scenes", nargs="+", choices=names, default=names, help="default: all")
+    add("--resolutions", nargs="+", type=positive_int, metavar="N", help="default: two per scene")
+    add("--json", type=Path, metavar="FILE", default=RESULTS, help=f"default: {RESULTS}")
+    return parser
+
+
+def run(name: str, resolution: int) -> dict[str, Any]:
+    """A full run of a scene and its row."""
+    scene = SCENES[name](resolution=resolution)
+    row = {
+        "scene": name,
+        "resolution": resolution,
+        "particles": len(scene.state.position),
+        "effects": [effect.name for effect in scene.effects],
+        "steps": scene.steps,
+        "end_time": scene.end_time,
+    }
+    fault = None
+    with progress(name, scene.steps) as report:
+        try:
+            trajectory = run_scene(scene, progress=report)
+        except SimulationError as error:
+            fault, trajectory = str(error), error.trajectory
+    timings = trajectory.metadata
+    row |= {
+        "fault": fault,
+        "seconds": timings["run_seconds"],
+        "compile_seconds": timings["compile_seconds"],
+        "reached": float(trajectory.time[-1]),
+        **_common(scene, trajectory),
+    }
+    return row if fault else row | MEASURES[name](scene, trajectory)
+
+
+def _common(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Densities, kinetic energy, and how evenly particles lie at the end."""
+    ratio = trajectory.density / float(scene.fluid.reference_density)
+    energy = _kinetic(trajectory)
+    tree = cKDTree(trajectory.position[-1])
+    nearest = tree.query(trajectory.position[-1], 2)[0][:, 1] / scene.space.spacing
+    return {
+        "density_low": float(ratio.min()),
+        "density_high": float(ratio.max()),
+        "kinetic_energy_peak_over_start": float(energy.max() / energy[0]) if energy[0] else None,
+        "nearest_over_dx_least": float(nearest.min()),
+        "nearest_over_dx_spread": float(nearest.std()),
+    }
+
+
+def _kinetic(trajectory: Trajectory) -> np.ndarray:
+    """Kinetic energy per particle mass (snapshots,)."""
+    return 0.5 * (trajectory.velocity**2).sum(axis=(1, 2))
+
+
+def _dam_break(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """The front along the floor against the experiment, up to its last measured place."""
+    width, tank = scene.parameters["column"][0], scene.parameters["tank"][0]
+    scaled = trajectory.time * np.sqrt(2.0 * GRAVITY / width)
+    front = (trajectory.position[:, :, 0].max(axis=1) + 0.5 * scene.space.spacing) / width
+    found = np.interp(FRONT_TIME, scaled, front)
+    error = 100.0 * (found / np.asarray(FRONT) - 1.0)
+    hit = np.argmax(front > tank / width - 0.6 * scene.space.spacing / width)
+    return {
+        "measure": "front, relative to Martin and Moyce (1952) [percent]",
+        "error_percent": float(np.abs(error).mean()),
+        "error_percent_peak": float(np.abs(error).max()),
+        "front_over_width": found.tolist(),
+        "impact_time": float(trajectory.time[hit]),
+    }
+
+
+def _standing_wave(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Decay rate and period of the kinetic energy, by a fit of a damped cosine."""
+    time, energy = trajectory.time, _kinetic(trajectory)
+    energy = energy / energy[0]
+    viscosity = 1.0 / scene.parameters["reynolds"]
+    rate = -float(np.log(energy_decay(1.0, viscosity)))
+
+    def wave(t, size, rate, frequency):
+        return size * np.exp(-rate * t) * np.cos(frequency * t) ** 2
+
+    fitted, _ = curve_fit(wave, time, energy, (1.0, rate, FREQUENCY))
+    return {
+        "measure": "decay of energy, relative to 4 nu k^2 [percent]",
+        "error_percent": 100.0 * abs(fitted[1] / rate - 1.0),
+        "decay_per_second": fitted[1],
+        "frequency_error_percent": 100.0 * (fitted[2] / FREQUENCY - 1.0),
+    }
+
+
+def _elliptic_drop(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """The semi-axes, from second moments, against the exact ones; and the period."""
+    moments = 2.0 * np.sqrt((trajectory.position**2).mean(axis=1))
+    start = np.sqrt(4.0 * (trajectory.position[0] ** 2).mean())
+    moments = moments / start
+    exact = np.stack(semi_axes(trajectory.time, scene.parameters["pull"]), axis=1)
+    error = 100.0 * np.abs(moments / exact - 1.0)
+    periods = [_crossing_period(trajectory.time, a[:, 0] - a[:, 1]) for a in (moments, exact)]
+    return {
+        "measure": "semi-axes, relative to the exact ones, mean over time [percent]",
+        "error_percent": float(error.mean()),
+        "error_percent_peak": float(error.max()),
+        "period": periods[0],
+        "period_error_percent": 100.0 * (periods[0] / periods[1] - 1.0),
+    }
+
+
+def _crossing_period(time: np.ndarray, wave: np.ndarray) -> float:
+    """Twice the mean time between zeros [s], the start not counted as one."""
+    turns = np.nonzero(wave[1:-1] * wave[2:] < 0.0)[0] + 1
+    zeros = time[turns] - wave[turns] * np.diff(time)[turns] / (wave[turns + 1] - wave[turns])
+    return 2.0 * float(np.diff(zeros).mean()) if len(zeros) > 1 else float("nan")
+
+
+def _oscillating_drop(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Period and decay of the second moment's difference, by a fit of a damped sine."""
+    squares = (trajectory.position**2).mean(axis=1)
+    wave = squares[:, 0] - squares[:, 1]
+    exact = np.sqrt(6.0)  # rad/s: sigma = rho0 = R = 1
+    decay = 4.0 / scene.parameters["reynolds"]
+
+    def sine(t, size, rate, frequency, phase, middle):
+        return size * np.exp(-rate * t) * np.sin(frequency * t + phase) + middle
+
+    fitted, _ = curve_fit(sine, trajectory.time, wave, (wave.max(), decay, exact, 0.0, 0.0))
+    return {
+        "measure": "period, relative to Rayleigh's [percent]",
+        "error_percent": 100.0 * abs(exact / fitted[2] - 1.0),
+        "period": 2.0 * np.pi / fitted[2],
+        "decay_per_second": fitted[1],
+        "decay_expected": decay,
+    }
+
+
+def _rotating_patch(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """What turning fluid keeps: its angular momentum; and its fourfold shape."""
+    x, u = trajectory.position, trajectory.velocity
+    spin = (x[:, :, 0] * u[:, :, 1] - x[:, :, 1] * u[:, :, 0]).sum(axis=1)
+    energy = _kinetic(trajectory)
+    turned = np.stack([-x[-1][:, 1], x[-1][:, 0]], axis=1)
+    apart = cKDTree(x[-1]).query(turned)[0] / scene.space.spacing
+    return {
+        "measure": "angular momentum lost by the end [percent]",
+        "error_percent": 100.0 * abs(spin[-1] / spin[0] - 1.0),
+        "kinetic_energy_lost_percent": 100.0 * (1.0 - energy[-1] / energy[0]),
+        "arm_length": float(np.sqrt((x[-1] ** 2).sum(axis=1).max())),
+        "asymmetry_over_dx": float(np.median(apart)),
+    }
+
+
+def _shear_layer(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """Momentum, and energy that only viscosity may take."""
+    energy = _kinetic(trajectory)
+    drift = np.abs(trajectory.velocity.mean(axis=1) - trajectory.velocity[0].mean(axis=0))
+    return {
+        "measure": "kinetic energy lost by the end [percent]",
+        "error_percent": 100.0 * (1.0 - energy[-1] / energy[0]),
+        "mean_velocity_drift": float(drift.max()),
+    }
+
+
+def _gresho(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """The velocity at the end against the steady one."""
+    exact = np.asarray(gresho_velocity(trajectory.position[-1]))
+    error = np.linalg.norm(trajectory.velocity[-1] - exact) / np.linalg.norm(exact)
+    energy = _kinetic(trajectory)
+    return {
+        "measure": "velocity at the end, relative L2 [percent]",
+        "error_percent": 100.0 * float(error),
+        "kinetic_energy_lost_percent": 100.0 * (1.0 - energy[-1] / energy[0]),
+    }
+
+
+MEASURES: dict[str, Callable[[Scene, Trajectory], dict[str, Any]]] = {
+    "dam-break": _dam_break,
+    "standing-wave": _standing_wave,
+    "elliptic-drop": _elliptic_drop,
+    "oscillating-drop": _oscillating_drop,
+    "rotating-square-patch": _rotating_patch,
+    "shear-layer": _shear_layer,
+    "gresho-vortex": _gresho,
+}
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    header = ("scene", "resolution", "particles", "error [%]", "of", "run [s]", "density / rho0")
+    return format_rows(
+        header,
+        [
+            (
+                row["scene"],
+                str(row["resolution"]),
+                str(row["particles"]),
+                number(row.get("error_percent")),
+                row["fault"] or row["measure"],
+                number(row["seconds"]),
+                f"{row['density_low']:.3f} to {row['density_high']:.3f}",
+            )
+            for row in rows
+        ],
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,1 @@
+"""Error against run time of full and reduced models, setting by setting."""

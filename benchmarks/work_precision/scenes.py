@@ -1,0 +1,192 @@
+"""Scenes of a setting, what their errors are taken against, and how users run them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import Trajectory, kernels
+from jaxsph.arrangements import Lattice, Packed, Stirred
+from jaxsph.effects import DensityDiffusion, ParticleShifting, ShiftingTransport
+from jaxsph.interpolation import MovingLeastSquaresMap
+from jaxsph.metrics import probe
+from jaxsph.scenes import SCENES, Scene, taylor_green_solution
+from jaxsph_rom.study import quiet
+
+from ..references.lid_driven_cavity import CavityFlow, regularised_lid, solve
+from .settings import MOVING, SAMPLED, TENSOR, Case, FullSetting, ReducedSetting, Setting
+
+STARTS = {"quiet": Stirred, "packed": Packed, "rest": Lattice}
+_MOST_JUDGED = 50  # snapshots, evenly spread over the time that counts
+
+
+def make_scene(name: str, case: Case, setting: FullSetting, reynolds: float) -> Scene:
+    """The scene of a setting, its step the largest that divides the run and is within `step`."""
+    given = {
+        "resolution": setting.resolution,
+        "reynolds": reynolds,
+        "h_over_dx": setting.h_over_dx,
+        "end_time": case.end_time,
+        "kernel": getattr(kernels, setting.kernel)(),
+        "mach": setting.mach,
+        "dtype": setting.precision,
+    }
+    cheap = SCENES[name](arrangement=Lattice(), **given)
+    interval = setting.step * cheap.stable_time_step * cheap.steps_per_snapshot
+    steps = cheap.steps_per_snapshot * math.ceil(case.end_time / interval - 1e-9)
+    scene = SCENES[name](
+        arrangement=STARTS[setting.start](), time_step=case.end_time / steps, **given
+    )
+    scene = dataclasses.replace(scene, effects=tuple(_effects(scene, setting)))
+    return quiet(scene) if setting.start == "quiet" else scene
+
+
+def _effects(scene: Scene, setting: FullSetting):
+    for effect in scene.effects:
+        if isinstance(effect, DensityDiffusion):
+            if setting.delta > 0.0:
+                yield DensityDiffusion(jnp.asarray(setting.delta, effect.delta.dtype))
+        elif setting.shifting or not isinstance(effect, ParticleShifting | ShiftingTransport):
+            yield effect
+
+
+def errors(case: Case, scene: Scene, trajectory: Trajectory) -> dict[str, float]:
+    """Relative L2 errors over particles or points, in percent, their peak and median over time:
+
+        100 || u - u_ref || / || u_ref ||,    100 || p - p_ref || / || p_ref ||,
+
+    both pressures less their mean over the particles. Times are those from `judged_from` on, the
+    start apart; the reference is taken where the particles are. Where it is steady, the pressure is
+    the mean over these times instead, without sound: particles are mapped to where they started.
+    """
+    density = float(scene.fluid.reference_density)
+    counted = np.flatnonzero((trajectory.time > 0.0) & (trajectory.time > case.judged_from))
+    counted = counted[np.unique(np.linspace(0, len(counted) - 1, _MOST_JUDGED).round().astype(int))]
+    run = jax.tree.map(lambda field: field[counted], trajectory)
+
+    def wanted(position, time):
+        return reference(scene.name, case.reynolds, np.asarray(position, float), time, density)
+
+    truths = [wanted(*at) for at in zip(run.position, run.time, strict=True)]
+    found = {
+        "velocity": [_relative(a, b) for a, (b, _) in zip(run.velocity, truths, strict=True)],
+        "pressure": [_fluctuation(a, b) for a, (_, b) in zip(run.pressure, truths, strict=True)],
+    }
+    if case.steady:
+        points, pressure = _mean_pressure(scene, run)
+        found["pressure"] = [_fluctuation(pressure, wanted(points, run.time[-1])[1])]
+    return {
+        f"{field}_{name}_percent": float(rule(values))
+        for field, values in found.items()
+        for name, rule in (("peak", np.max), ("median", np.median))
+    }
+
+
+def _mean_pressure(scene: Scene, run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Points (P, 2) and the mean over time of the pressure there (P,)."""
+    if np.array_equal(run.position[0], run.position[-1]):  # a model on reference points
+        return run.position[0], run.pressure.mean(axis=0)
+    points = np.asarray(scene.state.position)
+    return points, probe(run, points, scene.space, MovingLeastSquaresMap)[1].mean(axis=0)
+
+
+def reference(
+    name: str, reynolds: float, position: np.ndarray, time: float, density: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity (P, 2) [m/s] and pressure (P,) [Pa] at points; the cavity's flow is steady."""
+    if name == "lid-driven-cavity":
+        flow, inside = _cavity(reynolds), np.clip(position, 0.0, 1.0)
+        return flow.velocity(inside), density * flow.pressure(inside)
+    exact, points = taylor_green_solution, jnp.asarray(position)
+    viscosity = 1.0 / reynolds
+    return (
+        np.asarray(exact.velocity(points, time, viscosity)),
+        np.asarray(exact.pressure(points, time, viscosity, density)),
+    )
+
+
+@cache
+def _cavity(reynolds: float) -> CavityFlow:
+    return solve(reynolds, regularised_lid)
+
+
+def _relative(found: np.ndarray, true: np.ndarray) -> float:
+    found = np.asarray(found, float)
+    return 100.0 * float(np.linalg.norm(found - true) / np.linalg.norm(true))
+
+
+def _fluctuation(found: np.ndarray, true: np.ndarray) -> float:
+    return _relative(np.asarray(found, float) - found.mean(), true - true.mean())
+
+
+def command(name: str, case: Case, setting: Setting, time_step: float) -> str:
+    """How a user runs a setting: a command line, or a Python call where there is none."""
+    if isinstance(setting, ReducedSetting):
+        return _reduced_command(name, case, setting, time_step)
+    own = FullSetting(setting.resolution, setting.h_over_dx, setting.step, start=setting.start)
+    plain = dataclasses.replace(own, precision=setting.precision)
+    if setting == plain and setting.start == ("packed" if name == "taylor-green" else "rest"):
+        sizes = _sizes(setting, case, time_step)
+        return f"jaxsph run {name} --reynolds {case.reynolds:g} {sizes} --precision " + (
+            setting.precision
+        )
+    call = (
+        f"{name.replace('-', '_')}({setting.resolution}, {case.reynolds!r}, "
+        f"h_over_dx={setting.h_over_dx!r}, time_step={time_step!r}, end_time={case.end_time!r}, "
+        f"mach={setting.mach!r}, kernel=jaxsph.kernels.{setting.kernel}(), "
+        f"arrangement=jaxsph.arrangements.{STARTS[setting.start].__name__}(), "
+        f"dtype={setting.precision!r})"
+    )
+    left_out = [] if setting.shifting else ["ParticleShifting", "ShiftingTransport"]
+    if setting.delta == 0.0:
+        left_out.append("DensityDiffusion")
+    lines = ["import dataclasses", "import jaxsph", f"scene = jaxsph.scenes.{call}"]
+    if left_out:
+        lines.append(
+            "scene = dataclasses.replace(scene, effects=tuple(e for e in scene.effects if e.name "
+            f"not in {left_out!r}))"
+        )
+    elif setting.delta != own.delta:
+        lines.append(
+            "scene = dataclasses.replace(scene, effects=tuple(jaxsph.effects.DensityDiffusion("
+            f"{setting.delta!r}) if e.name == 'DensityDiffusion' else e for e in scene.effects))"
+        )
+    if setting.start == "quiet":
+        lines.append("scene = jaxsph.scenes.balanced(scene)")
+    return "\n".join([*lines, "run = jaxsph.run_scene(scene)"])
+
+
+def _sizes(setting: Setting, case: Case, time_step: float) -> str:
+    return (
+        f"--resolution {setting.resolution} --h-over-dx {setting.h_over_dx:g} "
+        f"--time-step {time_step!r} --t-end {case.end_time:g}"
+    )
+
+
+def _reduced_command(name, case: Case, setting: ReducedSetting, time_step: float) -> str:
+    if setting.family == SAMPLED:
+        return "benchmarks.work_precision.reduced.sampled (jaxsph_rom.hyper.SampledModel)"
+    quietly = setting.start == "quiet"
+    parts = [
+        f"jaxsph-rom run {name} --train {' '.join(f'{re:g}' for re in case.trained_on)} "
+        f"--predict {case.reynolds:g} --modes {setting.modes}",
+        _sizes(setting, case, time_step),
+        f"--inner-product {setting.product}",
+    ]
+    if setting.family == TENSOR:
+        parts.append(f"--hyper tensor --formulation {setting.formulation}")
+        parts.append(f"--closure {setting.closure}")
+    if setting.family == MOVING:
+        parts.append("--hyper none tensor" if quietly else "--hyper none")  # tensor: a quiet start
+        parts.append(f"--projection {setting.projection}")
+        if setting.tau is not None:
+            parts.append(f"--tau {setting.tau}")
+        parts.append(f"--advection {setting.advection} --map {setting.map}")
+        parts.append(f"--interpolation {setting.interpolation}")
+        parts.append(f"--spline-order {setting.spline_order}")
+    return " ".join(parts)

@@ -1,0 +1,94 @@
+"""Where the free surface is."""
+
+import jax.numpy as jnp
+
+from ..pairs import PairTerm
+from ..vector import Vector
+from .base import Effect, WallTerm
+
+_SPLASH = (0.25, 0.4)  # of completeness: single particles and thin jets lie below
+_INTERIOR = (0.95, 0.995)  # 0.50, 0.70, 0.94, 0.999 in the rows under a flat surface, h = 2 dx
+_ROUND_OFF = 1e-12
+
+
+def support_matrix(pair, i, j):
+    """Upper triangle of (x_j - x_i) (x) grad_i W_ij V_j"""
+    d, g = pair.separation, pair.gradient
+    return Vector(d[a] * g[b] for a in range(len(d)) for b in range(a, len(d)))
+
+
+def kernel_gradient(pair, i, j):
+    """grad_i W_ij V_j"""
+    return pair.gradient
+
+
+KERNEL_GRADIENT = PairTerm("kernel_gradient", (), kernel_gradient)
+WALL_KERNEL_GRADIENT = WallTerm("kernel_gradient", (), (), kernel_gradient)
+
+
+class FreeSurface(Effect):
+    """Tells particles near a free surface from those inside (Marrone et al. 2010):
+
+        lambda_i = smallest eigenvalue of sum_j (x_j - x_i) (x) grad_i W_ij V_j,
+        n_i = -sum_j grad_i W_ij V_j / |sum_j grad_i W_ij V_j|.
+
+    lambda is 1 where the kernel's support is full and 1/2 on a flat surface. Ghosts count as
+    neighbours: a wall is no free surface. Gives fields, and no rates, to the effects behind it:
+
+    - `surface_normal` n (N, n), outward;
+    - `interior` (N,), 0 where the support is cut by the surface, 1 where it is full;
+    - `coherent` (N,), 0 for a particle that flies alone or in a thin jet, 1 in the body of fluid.
+
+    The paper has no free surface; thresholds are ramps, so that all stays differentiable.
+    """
+
+    def geometry_terms(self, space):
+        return (PairTerm("support_matrix", (), support_matrix), KERNEL_GRADIENT)
+
+    def wall_geometry_terms(self, space):
+        return (WallTerm("support_matrix", (), (), support_matrix), WALL_KERNEL_GRADIENT)
+
+    def fields(self, context, fields, sums):
+        completeness = smallest_eigenvalue(sums["support_matrix"])
+        return {
+            "surface_normal": -_direction(sums["kernel_gradient"], context.space),
+            "interior": ramp(completeness, *_INTERIOR),
+            "coherent": ramp(completeness, *_SPLASH),
+        }
+
+
+def smallest_eigenvalue(upper):
+    """Of symmetric matrices of size 2 or 3, given by rows (N, 3) or (N, 6) of upper triangles.
+
+    Where eigenvalues coincide the derivative counts as zero.
+    """
+    if upper.shape[1] == 3:
+        a, b, d = (upper[:, k] for k in range(3))
+        return 0.5 * (a + d) - root((0.5 * (a - d)) ** 2 + b * b)
+    a, b, c, d, e, f = (upper[:, k] for k in range(6))
+    mean = (a + d + f) / 3.0
+    a, d, f = a - mean, d - mean, f - mean
+    size = root((a * a + d * d + f * f + 2.0 * (b * b + c * c + e * e)) / 6.0)
+    safe = jnp.where(size > 0.0, size, 1.0)
+    determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
+    cosine = jnp.clip(0.5 * determinant / safe**3, -1.0 + 1e-9, 1.0 - 1e-9)
+    return mean + 2.0 * size * jnp.cos((jnp.arccos(cosine) + 2.0 * jnp.pi) / 3.0)
+
+
+def root(square):
+    """The square root, without a slope at zero."""
+    positive = square > _ROUND_OFF
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
+
+
+def _direction(vectors, space):
+    """Unit vectors along `vectors` [1/m], zero where these are lost in round-off."""
+    scaled = vectors * space.smoothing_length
+    length = root(jnp.sum(scaled * scaled, axis=1))
+    return scaled / jnp.where(length > 0.0, length, 1.0)[:, None]
+
+
+def ramp(value, low, high):
+    """0 below `low`, 1 above `high`, with a smooth rise between (cubic)."""
+    share = jnp.clip((value - low) / (high - low), 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)

@@ -1,0 +1,135 @@
+"""A scene composed from a box, a rule for its particles, and a tuple of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from ..arrangements import Arrangement, Packed
+from ..domain import Box
+from ..effects import Effect
+from ..fluid import Fluid, LinearEquationOfState, TaitEquationOfState
+from ..kernels import Kernel, WendlandC2
+from ..pairs import Space
+from ..particles import ParticleState
+from ..walls import Region, Walls
+from ..walls.walls import fill
+from .scales import Scale
+from .scene import Scene, as_dtype
+
+
+def composed(
+    name: str,
+    *,
+    effects: Callable[[Any], tuple[Effect, ...]],
+    box: Box,
+    scale: Scale,
+    end_time: float,
+    reference_density: float,
+    reference_speed: float,
+    mach: float,
+    sound_speed: float | None = None,
+    side: float | None = None,
+    region: Region | None = None,
+    walls: Callable[[Space], Walls] | None = None,
+    velocity: Callable[[Array], Array] | None = None,
+    pressure: Callable[[Array], Array] | None = None,
+    equation_of_state: LinearEquationOfState | TaitEquationOfState | None = None,
+    arrangement: Arrangement | None = None,
+    kernel: Kernel | None = None,
+    dtype=None,
+    parameters: dict[str, Any],
+) -> Scene:
+    """What every scene of this library does with its settings.
+
+    Args:
+        name: of the scene.
+        effects: makes the effects, their coefficients in a given dtype.
+        box: around all that may happen.
+        scale: resolution, h/dx and steps.
+        end_time: [s].
+        reference_density: rho0 [kg/m^3].
+        reference_speed: U [m/s].
+        mach: U / c0.
+        sound_speed: c0 [m/s], where it is not U / mach.
+        side: the length [m] that the resolution divides; the box's longest if none is given.
+        region: where fluid is at the start; if none is given all that walls leave, or the box.
+        walls: makes the walls, if there are any.
+        velocity: positions (N, n) [m] -> velocities at the start (N, n) [m/s]; rest if none is
+            given.
+        pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
+        equation_of_state: the linear one if none is given.
+        arrangement: how particles start; packed if none is given.
+        kernel: Wendland C2 if none is given.
+        dtype: float64 or float32; JAX's default if none is given.
+        parameters: what the scene was made with, for the record; what all share is added.
+
+    Raises:
+        ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
+    """
+    positive(mach=mach, **{"t-end": end_time})
+    kernel = WendlandC2() if kernel is None else kernel
+    arrangement = Packed() if arrangement is None else arrangement
+    dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
+    dx = (max(box.lengths) if side is None else side) / scale.resolution
+    space = Space(box, kernel, scale.h_over_dx * dx, dx)
+    space.check()
+    fluid = Fluid(
+        *(
+            jnp.asarray(v, dtype)
+            for v in (reference_density, sound_speed or reference_speed / mach, reference_speed)
+        ),
+        equation_of_state=equation_of_state or LinearEquationOfState(),
+    )
+    around = None if walls is None else walls(space)
+    region = around.fluid_region if region is None and around is not None else region
+    position = arrangement.positions(space)
+    if region is not None:
+        position = fill(region, arrangement.places(space), position)
+    moving = jnp.zeros_like(position) if velocity is None else velocity(position)
+    start = jnp.zeros(len(position)) if pressure is None else pressure(position)
+    density = fluid.density(jnp.asarray(start, dtype))
+    return Scene(
+        name=name,
+        effects=effects(dtype),
+        fluid=fluid,
+        space=space,
+        state=as_dtype(ParticleState(position, moving, density), dtype),
+        time_step=scale.time_step,
+        end_time=end_time,
+        steps_per_snapshot=scale.steps_per_snapshot,
+        parameters={
+            **parameters,
+            "resolution": scale.resolution,
+            "h_over_dx": scale.h_over_dx,
+            "time_step": scale.time_step,
+            "end_time": end_time,
+            "mach": mach,
+            "arrangement": arrangement.record(),
+            "kernel": type(kernel).__name__,
+            "dtype": str(dtype),
+        },
+        walls=jax.tree.map(lambda a: a.astype(dtype), around),
+    )
+
+
+def pick_scale(scales: dict[str, Scale], scale: str) -> Scale:
+    """A scale by its name.
+
+    Raises:
+        ValueError: if there is no such scale.
+    """
+    if scale not in scales:
+        raise ValueError(f"scale: one of {', '.join(scales)}, got {scale!r}.")
+    return scales[scale]
+
+
+def positive(**values: float) -> None:
+    """Raise a ValueError that names the first value that is not positive."""
+    for name, value in values.items():
+        if not value > 0.0:
+            raise ValueError(f"{name}: must be positive, got {value:g}.")

@@ -1,0 +1,53 @@
+"""What all flows with a free surface share: the consistent delta-plus scheme (Sun et al. 2019)."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+from ..effects import (
+    BodyForce,
+    Continuity,
+    DensityDiffusion,
+    Effect,
+    FreeSlip,
+    FreeSurface,
+    ParticleShifting,
+    PressureForce,
+    ShiftingTransport,
+    SurfaceDiffusion,
+    SurfaceShifting,
+    TensileControl,
+    WallPressure,
+    WallRepulsion,
+)
+from ..walls import Region
+
+DELTA = 0.1  # of the density diffusion
+
+
+def free_surface_effects(
+    dtype, *more: Effect, force: BodyForce | None = None, vessel: Region | None = None
+) -> tuple[Effect, ...]:
+    """The effects of a flow with a free surface.
+
+    Args:
+        dtype: of coefficients.
+        more: viscosity, surface tension.
+        force: body force, if there is one.
+        vessel: where fluid may be, if there are walls; they are free of friction.
+    """
+    walls = (WallPressure(force), FreeSlip(), WallRepulsion(vessel)) if vessel is not None else ()
+    return (
+        Continuity(),
+        PressureForce(),
+        DensityDiffusion(jnp.asarray(DELTA, dtype)),
+        ParticleShifting(),
+        FreeSurface(),
+        SurfaceShifting(),
+        SurfaceDiffusion(),
+        TensileControl(),
+        ShiftingTransport(),
+        *more,
+        *(() if force is None else (force,)),
+        *walls,
+    )
