@@ -114,9 +114,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
         return
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     run = full_run(folder / "full", scene, progress)
-    reference = ReferenceSpace(
-        Lattice().positions(scene.space), scene.space, MovingLeastSquaresMap
-    )
+    reference = ReferenceSpace(Lattice().positions(scene.space), scene.space, MovingLeastSquaresMap)
     mapped = mapped_run(reference, run, scene.fluid)
     smooth = low_pass(mapped, run.time, cutoff)
     truth = profile_of(scene, run)

@@ -227,8 +227,10 @@ def _integrated(model: Model, first, scene, snapshots: int):
 
 def _seconds_of_rates(rates: EulerianRates) -> float:
     """Least time [s] of one evaluation on all points."""
-    fields = jnp.zeros((len(rates.points), 1 + rates.points.shape[1])).at[:, 0].set(
-        rates.functional.fluid.reference_density
+    fields = (
+        jnp.zeros((len(rates.points), 1 + rates.points.shape[1]))
+        .at[:, 0]
+        .set(rates.functional.fluid.reference_density)
     )
     evaluate = eqx.filter_jit(rates)
     seconds = []

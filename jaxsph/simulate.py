@@ -15,7 +15,7 @@ import numpy as np
 from .integrate import Fault, FaultCode, Model, SimulationError, integrate
 from .trajectory import Snapshot, Trajectory
 
-_ENLARGEMENTS = 4  # of the neighbour list in one run, together a factor of two
+_ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
 
 
 class Recorder(Protocol):

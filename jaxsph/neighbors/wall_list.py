@@ -25,6 +25,7 @@ from .verlet_list import (
     pick,
 )
 
+_FILLED = 0.7  # share of the places near walls that a vessel full of fluid takes, at least
 _BLOCK = 4_000_000  # candidates looked at in one go
 
 
@@ -133,7 +134,11 @@ class WalledSearch(eqx.Module):
         within_reach = jnp.asarray(distance < radius + half_diagonal)
         wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
         near = within_reach[reach_grid.locate(position)]
-        most = min(position.shape[0], int(np.ceil(margin * int(near.sum()))) + 1)
+        free = np.asarray(within_reach) & (distance > 0.72 * spacing)  # between ghosts is no room
+        room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
+        count = int(near.sum())
+        count = room if count < _FILLED * room else count  # fluid may flow there yet
+        most = min(position.shape[0], int(np.ceil(margin * count)) + 1)
         trial = cls(
             fluid,
             ghosts,

@@ -93,8 +93,7 @@ def streaming_pod(
     count = len(sigma)
     if count == 0:
         raise ValueError(
-            f"snapshots: all {times} are the centre, which has no modes; "
-            "record a longer run."
+            f"snapshots: all {times} are the centre, which has no modes; record a longer run."
         )
     if modes is not None and modes > count:
         raise ValueError(

@@ -184,9 +184,7 @@ def _results(options, trained: TrainedFlow, prediction: Prediction, path: Path) 
 
 
 def _print(results: dict[str, Any], trained: TrainedFlow, prediction: Prediction) -> None:
-    count, low, high = (
-        results[f"reynolds_{name}"] for name in ("numbers", "lowest", "highest")
-    )
+    count, low, high = (results[f"reynolds_{name}"] for name in ("numbers", "lowest", "highest"))
     made = trained.training
     trained_on = " ".join(f"{reynolds:g}" for reynolds in trained.reynolds)
     print_rows({

@@ -130,9 +130,7 @@ def _assembled(operators, modes, centre, weights, form) -> QuadraticSystem:
     gradient = slopes(operators.gradients, functions)
 
     def carried(gradient):  # tested, by each velocity in turn
-        return lax.map(
-            lambda one: -tested(jnp.einsum("gd,gfd...->gf...", one, gradient)), velocity
-        )
+        return lax.map(lambda one: -tested(jnp.einsum("gd,gfd...->gf...", one, gradient)), velocity)
 
     by_walls = carried(operators.gradients(rest))[:, 1:]  # [i, k]: moving walls' part, by mode i
     advection = form(carried(gradient))  # [i, k, j]: function j carried by function i
