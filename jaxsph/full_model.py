@@ -16,6 +16,8 @@ from .trajectory import Snapshot
 from .walls import Walls
 
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
+CFL = 1.5  # dt <= CFL h / c0 (paper)
+FORCE_SHARE = 0.25  # dt <= 0.25 (h / a)^1/2 (Monaghan 1992)
 SHIFT_SHARE = 0.5  # of the reference speed: the limit of the shift velocity
 
 
@@ -52,6 +54,23 @@ class FullModel(Model):
             *field_checks(state, self.functional.fluid.reference_density),
             *list_checks(self.search, auxiliary, state.position),
         )
+
+    def step_limit(self, state, change):
+        """The least of 1.5 h / (c0 + |u|), 0.25 (h / |a|)^1/2 and the limits of the effects, with
+        the largest speed and acceleration of a particle; the paper's 1.5 h / c0 at rest."""
+        functional = self.functional
+        fluid, space = functional.fluid, functional.space
+        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        limit = CFL * space.smoothing_length / (fluid.sound_speed + speed)
+        forced = change > 0.0
+        force = FORCE_SHARE * jnp.sqrt(space.smoothing_length / jnp.where(forced, change, 1.0))
+        limit = jnp.where(forced, jnp.minimum(limit, force), limit)
+        for effect in functional.effects:
+            limit = jnp.minimum(limit, effect.step_limit(fluid, space))
+        return lax.stop_gradient(limit)
+
+    def largest_change(self, old, new):
+        return jnp.sqrt(jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1)))
 
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())

@@ -12,7 +12,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .integrate import Fault, FaultCode, Model, SimulationError, integrate
+from .integrate import (
+    Fault,
+    FaultCode,
+    FixedSteps,
+    Model,
+    SimulationError,
+    Stepping,
+    integrate,
+)
 from .trajectory import Snapshot, Trajectory
 
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
@@ -25,8 +33,8 @@ class Recorder(Protocol):
 
 
 @eqx.filter_jit
-def _interval(model, state, first_step, time_step, steps):
-    state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1)
+def _interval(model, state, first_step, time_step, steps, stepping):
+    state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1, stepping)
     return state, fault, jax.tree.map(lambda a: a[0], snapshots)
 
 
@@ -41,12 +49,13 @@ def simulate(
     recorder: Recorder | None = None,
     progress: Callable[[int], None] | None = None,
     metadata: dict | None = None,
+    stepping: Stepping = FixedSteps(),  # noqa: B008
 ) -> Trajectory:
     """Integrate a model by RK4 and return its snapshots, the first being the state given.
 
     Run time excludes compilation: the first interval runs twice, once to compile. A neighbour
-    list that overflows is allocated anew with a fifth more room, up to four times, and the run goes
-    on from its last snapshot, with a warning.
+    list that overflows is allocated anew with a fifth more room, up to eight times, and the run
+    goes on from its last snapshot, with a warning.
 
     Args:
         model: full or reduced.
@@ -58,6 +67,7 @@ def simulate(
         recorder: is given each snapshot as it is made.
         progress: is called with the number of steps done since its last call.
         metadata: kept with the trajectory, beside `steps`, `run_seconds`, `compile_seconds`.
+        stepping: equal steps of dt; or `AutomaticSteps`, with intervals of the same length.
 
     Raises:
         ValueError: if the steps are not whole snapshot intervals.
@@ -114,7 +124,7 @@ def simulate(
     while step < steps:
         start = clock.perf_counter()
         new, fault, snapshot = jax.block_until_ready(
-            _interval(model, state, np.int32(step), dt, steps_per_snapshot)
+            _interval(model, state, np.int32(step), dt, steps_per_snapshot, stepping)
         )
         elapsed = clock.perf_counter() - start
         if not compiled:  # this interval runs once more, for its time without compilation

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, viscous_step_limit
 from .laminar_viscosity import viscous_sum
 
 
@@ -20,6 +20,10 @@ class ArtificialViscosity(Effect):
     """
 
     alpha: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def step_limit(self, fluid, space):
+        viscosity = self.alpha * space.smoothing_length * fluid.sound_speed
+        return viscous_step_limit(viscosity / (2 * (space.box.dim + 2)), space)
 
     def rate_terms(self, space):
         return (PairTerm("viscous_sum", ("velocity",), viscous_sum),)

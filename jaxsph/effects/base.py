@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..fluid import Fluid
@@ -34,6 +36,16 @@ class WallTerm(NamedTuple):
     function: Callable
 
 
+VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
+
+
+def viscous_step_limit(viscosity, space: Space):
+    """0.125 h^2 / nu [s], infinite for nu = 0."""
+    moving = viscosity > 0.0
+    limit = VISCOUS_LIMIT * space.smoothing_length**2 / jnp.where(moving, viscosity, 1.0)
+    return jnp.where(moving, limit, jnp.inf)
+
+
 class Effect(eqx.Module):
     """A part of the SPH functional, in at most two passes over the pairs.
 
@@ -54,6 +66,10 @@ class Effect(eqx.Module):
     def name(self) -> str:
         """The effect's name in reports and compiled programs."""
         return type(self).__name__
+
+    def step_limit(self, fluid: Fluid, space: Space) -> Float[Array, ""] | float:
+        """The longest stable step [s] as far as this effect goes."""
+        return math.inf
 
     def geometry_terms(self, space: Space) -> tuple[PairTerm, ...]:
         """Sums wanted of the first pass."""

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, viscous_step_limit
 
 
 def laplacian_sum(pair, i, j):
@@ -26,6 +26,9 @@ class IsotropicViscosity(Effect):
     """
 
     viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def step_limit(self, fluid, space):
+        return viscous_step_limit(self.viscosity, space)
 
     def rate_terms(self, space):
         return (PairTerm("laplacian_sum", ("velocity",), laplacian_sum),)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, viscous_step_limit
 
 
 def viscous_sum(pair, i, j):
@@ -24,6 +24,9 @@ class LaminarViscosity(Effect):
     """
 
     viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def step_limit(self, fluid, space):
+        return viscous_step_limit(self.viscosity, space)
 
     def rate_terms(self, space):
         return (PairTerm("viscous_sum", ("velocity",), viscous_sum),)

@@ -51,6 +51,11 @@ class SurfaceTension(Effect):
 
     tension: Float[Array, ""] = eqx.field(converter=jnp.asarray)
 
+    def step_limit(self, fluid, space):
+        """(rho0 h^3 / (2 pi sigma))^1/2: capillary waves as short as h (Brackbill et al. 1992)."""
+        wave = fluid.reference_density * space.smoothing_length**3
+        return jnp.sqrt(wave / (2.0 * jnp.pi * self.tension))
+
     def geometry_terms(self, space):
         return (KERNEL_GRADIENT,)
 

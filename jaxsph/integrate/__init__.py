@@ -7,3 +7,6 @@ from .faults import explanation as explanation
 from .loop import integrate as integrate
 from .model import Model as Model
 from .runge_kutta import rk4_step as rk4_step
+from .stepping import AutomaticSteps as AutomaticSteps
+from .stepping import FixedSteps as FixedSteps
+from .stepping import Stepping as Stepping

@@ -20,6 +20,7 @@ class FaultCode(IntEnum):
     SPLINE_CELL_OVERFLOW = 5
     BEYOND_WALL = 6
     ENERGY_OUT_OF_BOUNDS = 7
+    STEPS_EXHAUSTED = 8
 
 
 _EXPLANATIONS = {
@@ -38,6 +39,8 @@ _EXPLANATIONS = {
     FaultCode.ENERGY_OUT_OF_BOUNDS: "the flow has more energy than its reference speed allows, so "
     "the reduced model has left the flows that it knows; use other modes, a closure, or a "
     "parameter nearer to those trained on",
+    FaultCode.STEPS_EXHAUSTED: "the automatic steps became so short that an interval did not end; "
+    "allow more of them, or look at what moves so fast in the last snapshot",
 }
 
 

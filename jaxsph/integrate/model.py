@@ -40,6 +40,18 @@ class Model(eqx.Module):
         """The same model with more room for neighbours, or None if there is nothing to enlarge."""
         return None
 
+    def step_limit(self, state: Any, change: Float[Array, ""]) -> Float[Array, ""]:
+        """The longest stable step [s] from a state; `change` [m/s^2] is the largest of the last.
+
+        Raises:
+            NotImplementedError: if the model knows none, and runs by fixed steps only.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no step limit; use FixedSteps.")
+
+    def largest_change(self, old: Any, new: Any) -> Float[Array, ""]:
+        """The largest change of a velocity [m/s] between two states, for `step_limit`."""
+        raise NotImplementedError(f"{type(self).__name__} has no step limit; use FixedSteps.")
+
     @abc.abstractmethod
     def observe(self, state: Any) -> Snapshot:
         """The particle fields to record."""

@@ -8,12 +8,13 @@ import numpy as np
 from ..arrangements import Arrangement, JitteredLattice
 from ..domain import Box
 from ..effects import Effect, NoSlip
+from ..effects.base import VISCOUS_LIMIT
 from ..kernels import Kernel
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
 from .scales import Scale
-from .scene import VISCOUS_LIMIT, Scene
+from .scene import Scene
 
 LENGTH = 0.4  # m, of the periodic direction
 SCALES = {

@@ -18,9 +18,9 @@ REFERENCE_DENSITY = 1000.0  # kg/m^3
 GRAVITY = 9.81  # m/s^2
 WIDTH = 0.05715  # m, a of Martin and Moyce (1952): 2 1/4 inches
 SCALES = {
-    "small": Scale(resolution=150, h_over_dx=2.0, time_step=1.8e-4, steps_per_snapshot=20),
-    "half": Scale(resolution=300, h_over_dx=2.0, time_step=9e-5, steps_per_snapshot=40),
-    "paper": Scale(resolution=600, h_over_dx=2.0, time_step=4.5e-5, steps_per_snapshot=80),
+    "small": Scale(resolution=150, h_over_dx=2.0, time_step=1.2e-4, steps_per_snapshot=30),
+    "half": Scale(resolution=300, h_over_dx=2.0, time_step=6e-5, steps_per_snapshot=60),
+    "paper": Scale(resolution=600, h_over_dx=2.0, time_step=3e-5, steps_per_snapshot=120),
 }
 
 

@@ -30,9 +30,9 @@ RADIUS = 1.0  # m
 REACH = 2.0  # m from the centre to the faces of the box
 PERIOD = 2.0 * math.pi * math.sqrt(REFERENCE_DENSITY * RADIUS**3 / (6.0 * TENSION))  # s
 SCALES = {
-    "small": Scale(resolution=50, h_over_dx=2.0, time_step=1e-2, steps_per_snapshot=5),
-    "half": Scale(resolution=100, h_over_dx=2.0, time_step=5e-3, steps_per_snapshot=10),
-    "paper": Scale(resolution=200, h_over_dx=2.0, time_step=2.5e-3, steps_per_snapshot=20),
+    "small": Scale(resolution=50, h_over_dx=2.0, time_step=8e-3, steps_per_snapshot=5),
+    "half": Scale(resolution=100, h_over_dx=2.0, time_step=2.5e-3, steps_per_snapshot=10),
+    "paper": Scale(resolution=200, h_over_dx=2.0, time_step=1e-3, steps_per_snapshot=20),
 }
 
 
@@ -77,6 +77,10 @@ def oscillating_drop(
     if amplitude > 0.3:
         raise ValueError(f"amplitude: at most 0.3 of the radius, got {amplitude:g}.")
     strain = amplitude * 2.0 * math.pi / PERIOD
+
+    def capillary_step(scale: Scale) -> float:
+        h = scale.h_over_dx * 2.0 * RADIUS / scale.resolution
+        return 0.9 * math.sqrt(REFERENCE_DENSITY * h**3 / (2.0 * math.pi * TENSION))
 
     def effects(dtype):
         return (

@@ -8,17 +8,15 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import Effect, LaminarViscosity
+from ..effects import Effect
 from ..fluid import Fluid
-from ..full_model import FullModel
+from ..full_model import CFL, FullModel
 from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
 from ..particles import ParticleState
 from ..walls import Walls
 
-CFL = 1.5  # dt <= CFL h / c0 (paper)
-VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
 _SKIN = 0.82  # times dx: rebuilt about every second step of the paper's settings (measured)
 _WALL_MARGIN = 1.3  # times the list's need at the start: particles begin on a lattice there
 _SKIN_PER_STEP = 3.5  # times the way of the fastest particle in a step, at least
@@ -62,7 +60,8 @@ class Scene(eqx.Module):
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
-                "(the lesser of 1.5 h/c0 and 0.125 h^2/nu); choose one below it."
+                "(the least of 1.5 h/c0, 0.125 h^2/nu and the limits of other effects); choose one "
+                "below it."
             )
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
@@ -84,13 +83,10 @@ class Scene(eqx.Module):
 
     @property
     def stable_time_step(self) -> float:
-        """The largest stable step [s]: acoustic CFL of the paper, and viscous limit."""
-        h = self.space.smoothing_length
-        limit = CFL * h / float(self.fluid.sound_speed)
-        for effect in self.effects:
-            if isinstance(effect, LaminarViscosity) and float(effect.viscosity) > 0.0:
-                limit = min(limit, VISCOUS_LIMIT * h**2 / float(effect.viscosity))
-        return limit
+        """The largest stable step [s]: acoustic CFL of the paper, and those of its effects."""
+        acoustic = CFL * self.space.smoothing_length / float(self.fluid.sound_speed)
+        limits = (float(effect.step_limit(self.fluid, self.space)) for effect in self.effects)
+        return min(acoustic, *limits)
 
     @property
     def steps(self) -> int:

@@ -73,6 +73,7 @@ def test_diffraxs_adjoints_differentiate_a_model():
     wanted = (exact(3.0 + 1e-5) - exact(3.0 - 1e-5)) / 2e-5
     model = Forced(jnp.asarray(3.0))  # the backsolve cannot close over what is traced
     for adjoint in (diffrax.RecursiveCheckpointAdjoint(), diffrax.BacksolveAdjoint()):
+
         def final(start, adjoint=adjoint):
             return end_of(model, start, adjoint)
 

@@ -274,21 +274,21 @@ def test_motion_beyond_the_skin_is_reported(row):
 
 
 @pytest.mark.parametrize(
-    "name, value, code",
+    "name, value, code, step",
     [
-        ("density", 1201.0, FaultCode.DENSITY_OUT_OF_BOUNDS),
-        ("density", 799.0, FaultCode.DENSITY_OUT_OF_BOUNDS),
-        ("density", -1000.0, FaultCode.DENSITY_OUT_OF_BOUNDS),
-        ("density", np.inf, FaultCode.NOT_FINITE),
-        ("velocity", np.nan, FaultCode.NOT_FINITE),
-        ("position", np.nan, FaultCode.NOT_FINITE),
+        ("density", 1201.0, FaultCode.DENSITY_OUT_OF_BOUNDS, 1),
+        ("density", 799.0, FaultCode.DENSITY_OUT_OF_BOUNDS, 1),
+        ("density", -1000.0, FaultCode.DENSITY_OUT_OF_BOUNDS, 1),
+        ("density", np.inf, FaultCode.NOT_FINITE, 0),  # found before it is recorded
+        ("velocity", np.nan, FaultCode.NOT_FINITE, 0),
+        ("position", np.nan, FaultCode.NOT_FINITE, 0),
     ],
 )
-def test_wild_values_are_reported_with_their_particle(name, value, code):
+def test_wild_values_are_reported_with_their_particle(name, value, code, step):
     scene = straight_flight()
     with pytest.raises(SimulationError, match="particle 42") as caught:
         fly(with_value(scene.state, name, 42, value), scene)
-    assert (caught.value.code, caught.value.step, caught.value.particle) == (code, 1, 42)
+    assert (caught.value.code, caught.value.step, caught.value.particle) == (code, step, 42)
 
 
 @pytest.mark.parametrize("steps", [0, 3, -2])

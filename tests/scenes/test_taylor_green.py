@@ -173,7 +173,7 @@ def test_single_precision_runs_and_stays_close_to_double(trajectory):
         ("reynolds: must be positive", {"reynolds": float("nan")}),
         ("scale: one of small, half, paper, got 'huge'", {"scale": "huge"}),
         ("mach: must be positive", {"mach": 0.0}),
-        ("must be positive, got 0 s", {"end_time": 0.0}),
+        ("t-end: must be positive, got 0", {"end_time": 0.0}),
         ("resolution: at least 1 particle", {"resolution": 0}),
         ("too small for a kernel support.*[Rr]esolution|resolution", {"resolution": 4}),
         ("h_over_dx: at least 1", {"h_over_dx": 0.5}),

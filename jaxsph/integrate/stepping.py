@@ -1,0 +1,122 @@
+"""How the steps of an interval between two snapshots are chosen."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array, Float
+
+from .faults import Fault, FaultCode
+from .model import Model
+from .runge_kutta import rk4_step
+
+_ENDED = 1e-6  # of an interval: less than this is round-off
+
+
+class Stepping(eqx.Module):
+    """A rule for the RK4 steps of an interval."""
+
+    @abc.abstractmethod
+    def advance(
+        self,
+        model: Model,
+        state: Any,
+        fault: Fault,
+        start: Array,
+        time_step: Float[Array, ""],
+        steps: int,
+    ) -> tuple[Any, Fault]:
+        """The last good state of the interval and the fault (code 0 if none), in one `lax.scan`.
+
+        Args:
+            model: what to integrate.
+            state: where the interval starts.
+            fault: of the run so far; nothing is done after one.
+            start: number of the step before the interval.
+            time_step: dt [s].
+            steps: of dt in the interval.
+        """
+
+
+def _step(model: Model, state, auxiliary, number, time, time_step):
+    """One RK4 step, checked: the last good state, the auxiliary structure and the fault."""
+    auxiliary = model.refresh(auxiliary, state, time_step)
+    new = rk4_step(lambda t, y: model.rates(t, y, auxiliary), time, state, time_step)
+    new = model.finish(new)
+    fault = model.inspect(number, new, auxiliary)
+    good = fault.code == int(FaultCode.NONE)
+    kept = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, state)
+    return kept, auxiliary, fault
+
+
+@final
+class FixedSteps(Stepping):
+    """Equal steps of dt, the paper's."""
+
+    def advance(self, model, state, fault, start, time_step, steps):
+        def step(carry, number):
+            def move(carry):
+                state, auxiliary, _ = carry
+                time = (number - 1).astype(time_step.dtype) * time_step
+                return _step(model, state, auxiliary, number, time, time_step)
+
+            good = carry[2].code == int(FaultCode.NONE)
+            return lax.cond(good, move, lambda carry: carry, carry), None
+
+        numbers = start + 1 + jnp.arange(steps, dtype=jnp.int32)
+        (state, _, fault), _ = lax.scan(step, (state, model.prepare(state), fault), numbers)
+        return state, fault
+
+
+@final
+class AutomaticSteps(Stepping):
+    """Steps as long as the model's own limits allow, each interval a whole number of them.
+
+    `Model.step_limit` gives the limit of each step from the state and from the largest change of
+    velocity in the step before. The scan is `most` times as long as one of dt would be; what is
+    left of it once the interval's end is reached does nothing. A fault's step is counted in dt.
+
+    Args:
+        most: steps of an interval, times those of dt (static).
+    """
+
+    most: int = eqx.field(static=True, default=4)
+
+    def __check_init__(self):
+        if self.most < 1:
+            raise ValueError(f"most: at least 1, got {self.most}.")
+
+    def advance(self, model, state, fault, start, time_step, steps):
+        duration = steps * time_step
+
+        def going(carry):
+            _, _, fault, elapsed, _ = carry
+            left = duration - elapsed > _ENDED * duration
+            return left & (fault.code == int(FaultCode.NONE))
+
+        def move(carry):
+            state, auxiliary, _, elapsed, change = carry
+            left = duration - elapsed
+            step = left / jnp.ceil(left / model.step_limit(state, change))
+            step = jnp.where(jnp.isfinite(step), step, time_step)  # the step's checks name the rest
+            number = start + jnp.ceil((elapsed + step) / time_step - _ENDED).astype(jnp.int32)
+            time = start.astype(time_step.dtype) * time_step + elapsed
+            new, auxiliary, fault = _step(model, state, auxiliary, number, time, step)
+            return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
+
+        def step(carry, _):
+            return lax.cond(going(carry), move, lambda carry: carry, carry), None
+
+        zero = jnp.zeros((), time_step.dtype)
+        carry = (state, model.prepare(state), fault, zero, zero)
+        carry, _ = lax.scan(step, carry, None, length=self.most * steps)
+        state, _, fault, elapsed, _ = carry
+        short = going(carry)
+        number = start + jnp.ceil(elapsed / time_step).astype(jnp.int32)
+        out = Fault.first_of(number, (FaultCode.STEPS_EXHAUSTED, short, -1))
+        return state, jax.tree.map(lambda a, b: jnp.where(short, a, b), out, fault)
