@@ -19,7 +19,7 @@ from tqdm import tqdm
 from . import __version__
 from .arrangements import Arrangement, JitteredLattice, Lattice, Packed, Stirred
 from .environment import environment
-from .integrate import SimulationError
+from .integrate import AutomaticSteps, FixedSteps, SimulationError
 from .io import (
     Checkpoint,
     TrajectoryFileError,
@@ -35,6 +35,7 @@ from .scenes.record import scene_from_record
 from .simulate import simulate
 from .trajectory import Trajectory
 
+STEPPING = {"fixed": FixedSteps(), "automatic": AutomaticSteps()}
 ARRANGEMENTS = {
     "packed": Packed,
     "lattice": lambda seed: Lattice(),
@@ -57,6 +58,10 @@ _SCENE_OPTIONS = {
 }
 
 
+_STEPS_HELP = (
+    "fixed: dt throughout; automatic: as long as sound, viscosity, tension and forces allow "
+    "(default: fixed; give it again with --resume)"
+)
 _MARGIN_HELP = "room in the neighbour list over its need at the start (default: the scene's)"
 
 
@@ -154,6 +159,7 @@ def _parser() -> Parser:
     add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
     add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
     add("--precision", choices=("float32", "float64"), help="default: float64")
+    add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder for trajectory.h5 (default: out/SCENE)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
@@ -314,6 +320,7 @@ def _simulate(options, scene: Scene, model, writer: TrajectoryWriter, first_step
                 recorder=_Progress(writer, bar, float(scene.mass), unit),
                 progress=bar.update,
                 metadata=metadata,
+                stepping=STEPPING[options.steps],
             )
             writer.finish(trajectory.metadata)
     except (SimulationError, TrajectoryFileError) as error:

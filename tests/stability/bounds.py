@@ -89,6 +89,34 @@ WALLS = Bound(
     "nothing passes through a wall",
 )  # fmt: skip
 
+FALL = Bound(
+    "energy over reference", energy_over_reference, 0.25,
+    "a column of height H that falls into a layer gives m g H / 2, an eighth of U = 2 (g H)^1/2",
+)  # fmt: skip
+JET = Bound(
+    "highest speed", highest_speed, 3.0 * 2.12,
+    "jets of an impact, three times U = 2 (g H)^1/2 = 2.12 m/s at most",
+)  # fmt: skip
+CAPILLARY = Bound(
+    "energy over start", energy_over_start, 1.1,
+    "tension without exact conservation of momentum may feed a tenth of the oscillation's energy",
+)  # fmt: skip
+WAVE = Bound(
+    "energy over start", energy_over_start, 1.05,
+    "the level start holds no potential energy of the wave; sound adds a few percent",
+)  # fmt: skip
+
+JOLT = Bound(
+    "density", density_deviation, 0.1,
+    "a layer thinner than a spacing starts as a jump of 2 U between rows, whose sound is loud",
+)  # fmt: skip
+
+SPLASH = (LOOSE_DENSITY, FALL, JET, WALLS)
+PATCH = (DENSITY, DECAY)
+LAYER = (DENSITY, DECAY, MOMENTUM, DISTANCE, EVEN)
+UNRESOLVED = (JOLT, DECAY, MOMENTUM, EVEN)
+POOL = (DENSITY, WAVE, WALLS, DISTANCE, EVEN)
+TENSION_DROP = (DENSITY, CAPILLARY, DISTANCE, EVEN)
 VORTEX = (DENSITY, DECAY, MOMENTUM, DISTANCE, EVEN, VOLUME)
 CAVITY = (DENSITY, DRIVEN, LID_SPEED, WALLS, DISTANCE, EVEN)
 CHANNEL = (DENSITY, CHANNEL_SPEED, WALLS, DISTANCE, EVEN)

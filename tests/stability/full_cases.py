@@ -32,25 +32,25 @@ def _vortex(
     scene = taylor_green(
         resolution, reynolds, end_time=end_time, arrangement=arrangement, dtype=precision
     )
-    return Run(scene, _interval(scene, 50))
+    return Run(scene, interval(scene, 50))
 
 
 def _cavity(resolution: int, reynolds: float, end_time: float, precision: str) -> Run:
     scene = lid_driven_cavity(resolution, reynolds, end_time=end_time, dtype=precision)
-    return Run(scene, _interval(scene, 50))
+    return Run(scene, interval(scene, 50))
 
 
 def _tank(resolution: int, end_time: float, precision: str) -> Run:
     scene = hydrostatic_tank(resolution, end_time=end_time, dtype=precision)
-    return Run(scene, _interval(scene, 50))
+    return Run(scene, interval(scene, 50))
 
 
 def _open_cavity(resolution: int, end_time: float) -> Run:
     scene = open_cavity(resolution, end_time=end_time, dtype="float64")
-    return Run(scene, _interval(scene, 200))
+    return Run(scene, interval(scene, 200))
 
 
-def _interval(scene: Scene, snapshots: int) -> int:
+def interval(scene: Scene, snapshots: int) -> int:
     """Steps from one snapshot to the next for about so many snapshots."""
     return max(1, scene.steps // snapshots)
 

@@ -1,0 +1,52 @@
+"""Hard cases with free surfaces, under tension, and of thin shear layers."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from jaxsph.scenes import (
+    dam_break,
+    gresho_vortex,
+    oscillating_drop,
+    rotating_square_patch,
+    shear_layer,
+    standing_wave,
+)
+
+from .bounds import LAYER, PATCH, POOL, SPLASH, TENSION_DROP, UNRESOLVED
+from .full_cases import interval
+from .judge import Case, Run
+
+
+def _run(make, resolution: int, end_time: float, **more) -> Run:
+    scene = make(resolution, end_time=end_time, dtype="float64", **more)
+    return Run(scene, interval(scene, 40))
+
+
+def _case(name, what, bounds, make, resolution, end_time, slow=False, **more) -> Case:
+    return Case(name, what, partial(_run, make, resolution, end_time, **more), bounds, slow=slow)
+
+
+_THIN = 1.0 / 80.0  # m
+
+FREE = (
+    _case("dam-break/impact", "a = 10 dx, to t (2 g / a)^1/2 = 5.9, past the impact",
+          SPLASH, dam_break, 50, 0.32),
+    _case("dam-break/impact-long", "a = 30 dx, the same", SPLASH, dam_break, 150, 0.32, slow=True),
+    _case("patch/turn", "16 dx wide, omega t = 2: tension in the middle, arms grow",
+          PATCH, rotating_square_patch, 16, 2.0),
+    _case("patch/turn-long", "50 dx wide, omega t = 4", PATCH, rotating_square_patch, 50, 4.0,
+          slow=True),
+    _case("shear-layer/rolls-up", "layers of 1/30 m, 1.6 dx, on 48 x 48, Re = 1e4, 1 s",
+          LAYER, shear_layer, 48, 1.0),
+    _case("shear-layer/unresolved", "layers of 1/80 m, 0.4 dx, on 32 x 32, Re = 1e4, 1 s",
+          UNRESOLVED, shear_layer, 32, 1.0, thickness=_THIN),
+    _case("shear-layer/thin-long", "layers of 1/80 m on 128 x 128, Re = 1e6, 2 s",
+          LAYER, shear_layer, 128, 2.0, thickness=_THIN, reynolds=1e6, slow=True),
+    _case("gresho/inviscid", "32 x 32, without viscosity, 2 s", LAYER, gresho_vortex, 32, 2.0),
+    _case("standing-wave/long", "40 dx long, 12 s", POOL, standing_wave, 40, 12.0, slow=True),
+    _case("standing-wave/start", "32 dx long, 3 s", POOL, standing_wave, 32, 3.0),
+    _case("drop/tension", "24 dx across, 2 s", TENSION_DROP, oscillating_drop, 24, 2.0),
+    _case("drop/tension-long", "60 dx across, 6 s: two periods", TENSION_DROP, oscillating_drop,
+          60, 6.0, slow=True),
+)  # fmt: skip
