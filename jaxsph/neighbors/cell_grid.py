@@ -30,7 +30,9 @@ class CellBins(eqx.Module):
     @property
     def inverse(self) -> Int[Array, " particles"]:
         """Each particle's place in the sorted order."""
-        return jnp.argsort(self.order)
+        count = self.order.shape[0]
+        places = jnp.arange(count, dtype=self.order.dtype)
+        return jnp.zeros_like(self.order).at[self.order].set(places, unique_indices=True)
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ class CellGrid:
         order = jnp.argsort(cell).astype(jnp.int32)
         cell = cell[order]
         edges = jnp.searchsorted(
-            cell, jnp.arange(self.cells + 2, dtype=cell.dtype), method="sort"
+            cell, jnp.arange(self.cells + 2, dtype=cell.dtype), method="scan"
         ).astype(jnp.int32)
         start, end = edges[:-1], edges[1:]
         places = start[:, None] + jnp.arange(capacity, dtype=jnp.int32)[None, :]
