@@ -41,8 +41,9 @@ def dam_break(
 ) -> Scene:
     """A column of water in the corner of a closed tank, let go at t = 0.
 
-    rho0 = 1000 kg/m^3, g = 9.81 m/s^2, U = 2 (g H)^(1/2) with H the column's height; walls are
-    free of friction, the start is hydrostatic. The column and its tank are by default those of
+    rho0 = 1000 kg/m^3, g = 9.81 m/s^2; walls are free of friction, the start is hydrostatic.
+    U = 3 (g H)^(1/2) with H the column's height: where jets meet, they compress the water by their
+    speed over c0. The column and its tank are by default those of
     Martin and Moyce (1952), a = 0.05715 m wide and twice as high, in a tank 5 a long.
 
     Args:
@@ -86,7 +87,7 @@ def dam_break(
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
         reference_density=REFERENCE_DENSITY,
-        reference_speed=2.0 * (GRAVITY * height) ** 0.5,
+        reference_speed=3.0 * (GRAVITY * height) ** 0.5,
         mach=mach,
         side=tank[0],
         region=BoxRegion((0.0, 0.0), column),

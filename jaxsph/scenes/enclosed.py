@@ -11,24 +11,18 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import (
     BodyForce,
-    Continuity,
-    DensityDiffusion,
     Effect,
     LaminarViscosity,
     NoSlip,
-    ParticleShifting,
-    PressureForce,
-    ShiftingTransport,
     WallPressure,
     WallRepulsion,
 )
 from ..kernels import Kernel
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
+from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
-
-DELTA = 0.1  # of the density diffusion
 
 
 def enclosed_flow(
@@ -84,12 +78,7 @@ def enclosed_flow(
     def effects(dtype) -> tuple[Effect, ...]:
         drive = None if force is None else force(dtype)
         return (
-            Continuity(),
-            PressureForce(),
-            LaminarViscosity(jnp.asarray(viscosity, dtype)),
-            DensityDiffusion(jnp.asarray(DELTA, dtype)),
-            ParticleShifting(),
-            ShiftingTransport(),
+            *delta_plus(dtype, LaminarViscosity(jnp.asarray(viscosity, dtype))),
             *(() if drive is None else (drive,)),
             WallPressure(drive),
             NoSlip() if wall_velocity is None else wall_velocity,

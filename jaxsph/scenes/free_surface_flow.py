@@ -21,8 +21,7 @@ from ..effects import (
     WallRepulsion,
 )
 from ..walls import Region
-
-DELTA = 0.1  # of the density diffusion
+from .delta_plus import DELTA
 
 
 def free_surface_effects(

@@ -6,15 +6,9 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import (
-    Continuity,
-    DensityDiffusion,
-    ParticleShifting,
-    PressureForce,
-    ShiftingTransport,
-)
 from ..kernels import Kernel
 from .composed import composed, pick_scale, positive
+from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -78,13 +72,7 @@ def gresho_vortex(
     positive(**{"t-end": end_time})
     return composed(
         "gresho-vortex",
-        effects=lambda dtype: (
-            Continuity(),
-            PressureForce(),
-            DensityDiffusion(jnp.asarray(0.1, dtype)),
-            ParticleShifting(),
-            ShiftingTransport(),
-        ),
+        effects=delta_plus,
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,

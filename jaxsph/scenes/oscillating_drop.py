@@ -20,7 +20,7 @@ from ..effects import (
 from ..kernels import Kernel
 from ..walls import BallRegion
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import DELTA
+from .delta_plus import DELTA
 from .scales import Scale
 from .scene import Scene
 

@@ -6,16 +6,10 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import (
-    Continuity,
-    DensityDiffusion,
-    LaminarViscosity,
-    ParticleShifting,
-    PressureForce,
-    ShiftingTransport,
-)
+from ..effects import LaminarViscosity
 from ..kernels import Kernel
 from .composed import composed, pick_scale, positive
+from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -75,13 +69,8 @@ def shear_layer(
 
     return composed(
         "shear-layer",
-        effects=lambda dtype: (
-            Continuity(),
-            PressureForce(),
-            LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)),
-            DensityDiffusion(jnp.asarray(0.1, dtype)),
-            ParticleShifting(),
-            ShiftingTransport(),
+        effects=lambda dtype: delta_plus(
+            dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype))
         ),
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),

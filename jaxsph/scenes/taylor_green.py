@@ -6,17 +6,11 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import (
-    Continuity,
-    DensityDiffusion,
-    LaminarViscosity,
-    ParticleShifting,
-    PressureForce,
-    ShiftingTransport,
-)
+from ..effects import LaminarViscosity
 from ..kernels import Kernel
 from . import taylor_green_solution as exact
 from .composed import composed, pick_scale, positive
+from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -105,19 +99,9 @@ def _vortex(
             return exact.pressure(position, 0.0, viscosity, density)
         return exact.initial_pressure_3d(position, density)
 
-    def effects(dtype):
-        return (
-            Continuity(),
-            PressureForce(),
-            LaminarViscosity(jnp.asarray(viscosity, dtype)),
-            DensityDiffusion(jnp.asarray(0.1, dtype)),
-            ParticleShifting(),
-            ShiftingTransport(),
-        )
-
     return composed(
         name,
-        effects=effects,
+        effects=lambda dtype: delta_plus(dtype, LaminarViscosity(jnp.asarray(viscosity, dtype))),
         box=Box.unit_periodic(dim),
         scale=chosen,
         end_time=end_time,

@@ -90,12 +90,12 @@ WALLS = Bound(
 )  # fmt: skip
 
 FALL = Bound(
-    "energy over reference", energy_over_reference, 0.25,
-    "a column of height H that falls into a layer gives m g H / 2, an eighth of U = 2 (g H)^1/2",
+    "energy over reference", energy_over_reference, 0.15,
+    "a column of height H that falls into a layer gives m g H / 2, a ninth of U = 3 (g H)^1/2",
 )  # fmt: skip
 JET = Bound(
-    "highest speed", highest_speed, 3.0 * 2.12,
-    "jets of an impact, three times U = 2 (g H)^1/2 = 2.12 m/s at most",
+    "highest speed", highest_speed, 6.4,
+    "jets of an impact, twice U = 3 (g H)^1/2 = 3.2 m/s at most",
 )  # fmt: skip
 CAPILLARY = Bound(
     "energy over start", energy_over_start, 1.1,
