@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
-from ..effects import ArtificialViscosity, Gravity
+from ..effects import ArtificialViscosity, Gravity, NoSlip
 from ..kernels import Kernel
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
@@ -41,7 +41,7 @@ def dam_break(
 ) -> Scene:
     """A column of water in the corner of a closed tank, let go at t = 0.
 
-    rho0 = 1000 kg/m^3, g = 9.81 m/s^2; walls are free of friction, the start is hydrostatic.
+    rho0 = 1000 kg/m^3, g = 9.81 m/s^2; water sticks to the walls, the start is hydrostatic.
     U = 3 (g H)^(1/2) with H the column's height: where jets meet, they compress the water by their
     speed over c0. The column and its tank are by default those of
     Martin and Moyce (1952), a = 0.05715 m wide and twice as high, in a tank 5 a long.
@@ -78,6 +78,7 @@ def dam_break(
             ArtificialViscosity(jnp.asarray(alpha, dtype)),
             force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
             vessel=vessel,
+            wall_velocity=NoSlip(),
         )
 
     return composed(

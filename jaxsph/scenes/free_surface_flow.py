@@ -25,7 +25,11 @@ from .delta_plus import DELTA
 
 
 def free_surface_effects(
-    dtype, *more: Effect, force: BodyForce | None = None, vessel: Region | None = None
+    dtype,
+    *more: Effect,
+    force: BodyForce | None = None,
+    vessel: Region | None = None,
+    wall_velocity: Effect | None = None,
 ) -> tuple[Effect, ...]:
     """The effects of a flow with a free surface.
 
@@ -33,9 +37,13 @@ def free_surface_effects(
         dtype: of coefficients.
         more: viscosity, surface tension.
         force: body force, if there is one.
-        vessel: where fluid may be, if there are walls; they are free of friction.
+        vessel: where fluid may be, if there are walls.
+        wall_velocity: how viscosity sees these; `FreeSlip()` if none is given.
     """
-    walls = (WallPressure(force), FreeSlip(), WallRepulsion(vessel)) if vessel is not None else ()
+    walls: tuple[Effect, ...] = ()
+    if vessel is not None:
+        slip = FreeSlip() if wall_velocity is None else wall_velocity
+        walls = (WallPressure(force), slip, WallRepulsion(vessel))
     return (
         Continuity(),
         PressureForce(),
