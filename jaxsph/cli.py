@@ -42,6 +42,7 @@ ARRANGEMENTS = {
     "jittered": JitteredLattice,
     "stirred": Stirred,
 }
+_COSTLY = ("Packed", "Stirred")  # to make, and as many particles as the lattice
 SCALES = ("small", "half", "paper")
 # options that say what is run, and the scene's name for each; a resumed run has them from its file
 _SCENE_OPTIONS = {
@@ -139,8 +140,11 @@ def _parser() -> Parser:
     parser = Parser("jaxsph", description="Differentiable smoothed-particle hydrodynamics.")
     parser.add_argument("--version", action="version", version=f"jaxsph {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    scenes = commands.add_parser("scenes", help="list the scenes, their effects and scales")
+    scenes = commands.add_parser("scenes", help="list the scenes, their effects and sizes")
     scenes.set_defaults(command=_list_scenes)
+    scenes.add_argument(
+        "--scale", choices=SCALES, action="append", help="sizes to list (default: small)"
+    )
     run = commands.add_parser("run", help="run a full model", description="Run a full model.")
     run.set_defaults(command=_run)
     add = run.add_argument
@@ -171,9 +175,11 @@ def _parser() -> Parser:
 def _list_scenes(options) -> int:
     for name, make in SCENES.items():
         print(f"{name}: {(inspect.getdoc(make) or '').partition(chr(10))[0]}")
-        for scale in SCALES:
+        for number, scale in enumerate(options.scale or SCALES[:1]):
             scene = make(scale=scale, **_cheap(make))
-            if scale == SCALES[0]:
+            if not all(scene.space.box.periodic):  # only periodic scenes pack their particles
+                scene = make(scale=scale)
+            if number == 0:
                 print(f"  effects: {', '.join(effect.name for effect in scene.effects)}")
             print(
                 f"  {scale:6} {scene.state.position.shape[0]:>7} particles, "
@@ -268,7 +274,8 @@ def _resume(options) -> int:
 def _restored(path: Path, checkpoint: Checkpoint) -> Scene:
     """The scene of a file, its particles as they were last stored."""
     state = checkpoint.state
-    spared = Lattice() if state is not None and "arrangement" in checkpoint.parameters else None
+    rule = checkpoint.parameters.get("arrangement", {}).get("rule")
+    spared = Lattice() if state is not None and rule in _COSTLY else None
     scene = scene_from_record(checkpoint.scene, checkpoint.parameters, spared)
     same = ("time_step", "steps", "steps_per_snapshot")
     fits = all(getattr(scene, name) == getattr(checkpoint, name) for name in same)

@@ -14,7 +14,7 @@ import pytest
 
 import jaxsph
 from jaxsph.arrangements import Lattice
-from jaxsph.cli import main
+from jaxsph.cli import SCALES, main
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, SimulationError
 from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
@@ -35,8 +35,15 @@ def last_line(capsys):
 def test_lists_scenes(capsys):
     assert main(["scenes"]) == 0
     printed = capsys.readouterr().out
-    for word in (*SCENES, "PressureForce", "small", "half", "paper"):
+    for word in (*SCENES, "PressureForce", "FreeSurface", "small"):
         assert word in printed
+
+
+@pytest.mark.slow
+def test_lists_scenes_at_all_scales(capsys):
+    assert main(["scenes", *(word for scale in SCALES for word in ("--scale", scale))]) == 0
+    printed = capsys.readouterr().out
+    assert all(printed.count(f"  {scale} ") == len(SCENES) for scale in SCALES)
 
 
 def test_run(tmp_path, capsys):

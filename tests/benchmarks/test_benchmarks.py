@@ -78,6 +78,7 @@ def test_convergence_is_taken_up_again(tmp_path, capsys):
     assert not without_shifting["shifting"] and without_shifting["momentum_drift"] < 1e-14
 
 
+@pytest.mark.slow
 def test_reduced_models_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "rom.json"
     same = ["taylor-green", "--resolution", "12", "--end-time", "0.1", "--arrangement", "lattice"]

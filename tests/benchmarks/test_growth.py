@@ -107,6 +107,7 @@ def test_fourier_modes_are_orthonormal_and_make_the_vortex():
     np.testing.assert_allclose(made, vortex, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "programs"), TINY, ids=[case.family for case, _ in TINY])
 def test_every_family(case, programs):
     row = measured(case, repeats=1)
@@ -124,6 +125,7 @@ def test_every_family(case, programs):
     assert json.dumps(row)
 
 
+@pytest.mark.slow
 def test_finished_cases_are_not_run_again(tmp_path, capsys, monkeypatch):
     path, image = tmp_path / "growth.json", tmp_path / "growth.png"
     arguments = ["--quick", "--repeats", "1", "--json", str(path), "--figure", str(image)]

@@ -23,6 +23,7 @@ def in_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 def test_runs_without_peers(tmp_path, capsys):
     path = tmp_path / "peers.json"
     sizes = ["--resolution", "12", "--h-over-dx", "2", "--repeats", "2", "--end-time", "0.05"]
@@ -84,6 +85,7 @@ def test_our_side_gives_the_functional_of_the_scene(tmp_path):
     assert side.advance()["fault"] is None
 
 
+@pytest.mark.slow
 def test_a_failing_code_says_why(tmp_path):
     with workers([Code(OURS, sys.executable, "ours")]) as (started, _):
         with pytest.raises(WorkerError, match="one of load, .* got 'sing'"):

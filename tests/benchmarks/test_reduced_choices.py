@@ -60,8 +60,9 @@ def test_larger_steps(tmp_path, capsys, monkeypatch):
         assert row["stable"] and 0 < row["seconds"]["median"] < row["compile_seconds"]
         assert 0 < row["error"] < 0.01 and np.isfinite(row["pressure_peak_percent"])
         # stages of a step, and of the guess at the first one; implicit ones iterate
-        assert row["evaluations"] >= {"rk4": 4, "tsit5": 6, "kvaerno3": 3}[row["method"]] * (
-            row["steps"]
+        assert (
+            row["evaluations"]
+            >= {"rk4": 4, "tsit5": 6, "kvaerno3": 3}[row["method"]] * (row["steps"])
         )
     assert rows[0]["evaluations"] == 4 * rows[0]["steps"] == 2 * rows[1]["evaluations"]
     # in so short a run both tolerances may take the same steps

@@ -45,6 +45,7 @@ def test_wall_cost(tmp_path, capsys):
     assert "walled ms" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_viscous_sum_on_a_lattice(tmp_path):
     path = tmp_path / "sum.json"
     arguments = ["--resolutions", "32", "--h-over-dx", "2", "--json", str(path)]
@@ -86,6 +87,7 @@ def test_cases_of_the_cavity_have_whole_intervals():
                 assert every == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 def test_open_cavity(tmp_path, capsys):
     path = tmp_path / "open.json"
     arguments = ["--resolution", "24", "--end-time", "0.2", "--json", str(path)]

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -49,12 +50,16 @@ def made(effects, space, position, velocity=None, density=None, fluid=FLUID):
         jnp.ones(count) if density is None else density,
     )
     search = NeighborSearch.allocate(position, space.box, space.support, 0.1 * space.spacing)
-    neighbors = search.build(position)
     mass = fluid.reference_density * space.spacing**space.box.dim
-    functional = SPHFunctional(effects, fluid, mass, space)
-    _, fields, _ = functional.sums(jnp.zeros(()), state, neighbors)
+    return evaluated(SPHFunctional(effects, fluid, mass, space), search, state)
+
+
+@eqx.filter_jit
+def evaluated(functional, search, state):
+    neighbors, start = search.build(state.position), jnp.zeros(())
+    _, fields, _ = functional.sums(start, state, neighbors)
     fields = {name: neighbors.unsort(field) for name, field in fields.items()}
-    return fields, functional(jnp.zeros(()), state, neighbors)
+    return fields, functional(start, state, neighbors)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -96,10 +101,7 @@ def test_a_particle_that_flies_alone_is_not_coherent():
 
 
 def fields_of(scene):
-    neighbors = scene.search().build(scene.state.position)
-    functional = scene.functional()
-    _, fields, _ = functional.sums(jnp.zeros(()), scene.state, neighbors)
-    return {name: neighbors.unsort(field) for name, field in fields.items()}
+    return evaluated(scene.functional(), scene.search(), scene.state)[0]
 
 
 def test_a_wall_is_no_free_surface():

@@ -38,7 +38,7 @@ FREE = (
     _case("patch/turn-long", "50 dx wide, omega t = 4", PATCH, rotating_square_patch, 50, 4.0,
           slow=True),
     _case("shear-layer/rolls-up", "layers of 1/30 m, 1.6 dx, on 48 x 48, Re = 1e4, 1 s",
-          LAYER, shear_layer, 48, 1.0),
+          LAYER, shear_layer, 48, 1.0, slow=True),
     _case("shear-layer/unresolved", "layers of 1/80 m, 0.4 dx, on 32 x 32, Re = 1e4, 1 s",
           UNRESOLVED, shear_layer, 32, 1.0, thickness=_THIN),
     _case("shear-layer/thin-long", "layers of 1/80 m on 128 x 128, Re = 1e6, 2 s",

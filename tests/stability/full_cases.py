@@ -103,11 +103,11 @@ _ARRANGEMENTS = (("lattice", Lattice()), ("packed", Packed()), ("jittered", Jitt
 
 LONG = (
     *(_vortex_case(f"re-{n}", f"Re = {n}, 32 x 32, 5 s: several turns after the laminar time",
-                   32, re, 5.0) for re, n in _RE),
+                   32, re, 5.0, slow=re < 1e6) for re, n in _RE),
     *(_vortex_case(f"re-{n}-long", f"Re = {n}, 100 x 100, 20 s", 100, re, 20.0, slow=True)
       for re, n in _RE),
-    *(_vortex_case(f"from-{n}", f"started on the {n} arrangement, 24 x 24, 2 s", arrangement=a)
-      for n, a in _ARRANGEMENTS),
+    *(_vortex_case(f"from-{n}", f"started on the {n} arrangement, 24 x 24, 2 s", arrangement=a,
+                   slow=n != "lattice") for n, a in _ARRANGEMENTS),
     *(_vortex_case(f"from-{n}-re-1e6", f"Re = 1e6 from the {n} arrangement, 64 x 64, 10 s",
                    64, 1e6, 10.0, a, slow=True) for n, a in _ARRANGEMENTS),
     _vortex_case("float32", "single precision, Re = 1e4, 24 x 24, 3 s",
