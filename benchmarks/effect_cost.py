@@ -165,7 +165,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     axes.barh(names, added, color="#0072B2")
     for place, value in enumerate(added):
         axes.text(max(value, 0.0) + 0.01, place, f"{100.0 * value:.0f} %", va="center", fontsize=8)
-    axes.set_xlabel("time added / time of a scene with continuity and pressure alone")
+    axes.set_xlabel("time added / time of the bare scene")
     axes.set_xlim(min(0.0, *added), 1.15 * max(added))
     axes.tick_params(axis="y", labelsize=8)
     for side in ("top", "right"):
