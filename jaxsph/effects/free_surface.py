@@ -40,6 +40,9 @@ class FreeSurface(Effect):
     - `coherent` (N,), 0 for a particle that flies alone or in a thin jet, 1 in the body of fluid.
 
     The paper has no free surface; thresholds are ramps, so that all stays differentiable.
+
+    Raises:
+        ValueError: if `TensileControl` stands before it.
     """
 
     def geometry_terms(self, space):
@@ -49,6 +52,10 @@ class FreeSurface(Effect):
         return (WallTerm("support_matrix", (), (), support_matrix), WALL_KERNEL_GRADIENT)
 
     def fields(self, context, fields, sums):
+        if "tensile_release" in fields:  # it would have taken the surface for the inside
+            raise ValueError(
+                "effects: FreeSurface must stand before TensileControl; move it there."
+            )
         completeness = smallest_eigenvalue(sums["support_matrix"])
         return {
             "surface_normal": -_direction(sums["kernel_gradient"], context.space),

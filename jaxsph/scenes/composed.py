@@ -12,7 +12,7 @@ from jaxtyping import Array
 from ..arrangements import Arrangement, Packed
 from ..domain import Box
 from ..effects import Effect
-from ..fluid import Fluid, LinearEquationOfState, TaitEquationOfState
+from ..fluid import Fluid
 from ..kernels import Kernel, WendlandC2
 from ..pairs import Space
 from ..particles import ParticleState
@@ -38,7 +38,6 @@ def composed(
     walls: Callable[[Space], Walls] | None = None,
     velocity: Callable[[Array], Array] | None = None,
     pressure: Callable[[Array], Array] | None = None,
-    equation_of_state: LinearEquationOfState | TaitEquationOfState | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     dtype=None,
@@ -62,7 +61,6 @@ def composed(
         velocity: positions (N, n) [m] -> velocities at the start (N, n) [m/s]; rest if none is
             given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
-        equation_of_state: the linear one if none is given.
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
         dtype: float64 or float32; JAX's default if none is given.
@@ -83,7 +81,6 @@ def composed(
             jnp.asarray(v, dtype)
             for v in (reference_density, sound_speed or reference_speed / mach, reference_speed)
         ),
-        equation_of_state=equation_of_state or LinearEquationOfState(),
     )
     around = None if walls is None else walls(space)
     region = around.fluid_region if region is None and around is not None else region

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxsph import Box, Fluid, ParticleState, SPHFunctional, TaitEquationOfState
-from jaxsph.arrangements import JitteredLattice, Lattice, Rings
+from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.effects import (
     ArtificialViscosity,
     BackgroundPressure,
@@ -222,7 +222,6 @@ def round_drop(resolution):
 
 def test_rings_fill_a_disc_with_particles_of_equal_volume():
     space, position, _ = round_drop(40)
-    assert isinstance(Rings(), Rings)
     radius = np.linalg.norm(position, axis=1)
     assert np.pi * radius.max() ** 2 < len(radius) * space.spacing**2
     assert len(radius) * space.spacing**2 == pytest.approx(np.pi, rel=2e-3)
@@ -283,6 +282,12 @@ def test_effects_of_the_surface_have_true_derivatives(effects):
     step = 1e-6 * space.spacing
     central = (scalar(position + step * way) - scalar(position - step * way)) / (2.0 * step)
     assert float((slope * way).sum()) == pytest.approx(float(central), rel=1e-5)
+
+
+def test_tensile_control_before_the_surface_is_refused():
+    space, position = slab()
+    with pytest.raises(ValueError, match="FreeSurface must stand before TensileControl"):
+        made((PressureForce(), TensileControl(), FreeSurface()), space, position)
 
 
 def test_an_effect_of_the_surface_without_its_fields_names_what_is_missing():

@@ -1,6 +1,5 @@
 """Every scene is compiled from its own effects; the new scenes against what is known of them."""
 
-import dataclasses
 import inspect
 import json
 import re
@@ -19,8 +18,7 @@ import jaxsph
 from jaxsph import effects as all_effects
 from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
-from jaxsph.effects import Effect, Gravity
-from jaxsph.effects.body_force import BodyForce
+from jaxsph.effects import Effect
 from jaxsph.scenes import (
     SCENES,
     dam_break,
@@ -219,13 +217,6 @@ def test_periodic_flows_lose_energy_and_keep_momentum(make):
 def test_settings_out_of_range_are_named(make, options, message):
     with pytest.raises(ValueError, match=message):
         make(**options)
-
-
-def test_body_forces_are_effects_by_their_own_name():
-    assert issubclass(Gravity, BodyForce)
-    scene = dam_break(50)
-    assert [effect.name for effect in scene.effects if isinstance(effect, BodyForce)] == ["Gravity"]
-    assert dataclasses.replace(scene, parameters={}).name == "dam-break"
 
 
 @pytest.mark.parametrize(
