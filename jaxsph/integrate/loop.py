@@ -9,6 +9,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from ..trajectory import Snapshot
+from .checkpoints import segment_length
 from .faults import Fault, FaultCode
 from .model import Model
 from .stepping import FixedSteps, Stepping
@@ -22,12 +23,16 @@ def integrate(
     steps_per_snapshot: int,
     snapshots: int,
     stepping: Stepping = FixedSteps(),  # noqa: B008
+    checkpoints: int | None = None,
 ) -> tuple[Any, Fault, Snapshot, Array]:
     """RK4 over `snapshots` intervals of `steps_per_snapshot` dt each, in nested `lax.scan`s.
 
     Pure: jit, vmap and differentiate it. The auxiliary structure is built anew at the start of
     every interval, so that a run which starts from a snapshot repeats this one bit by bit. After
     a fault the last good state stays and the remaining steps do nothing.
+
+    Reverse mode keeps `checkpoints` states and runs the steps between them once more: memory grows
+    as the square root of the steps, and a gradient costs one run more than if all were kept.
 
     Args:
         model: what to integrate.
@@ -37,14 +42,20 @@ def integrate(
         steps_per_snapshot: of dt in an interval.
         snapshots: intervals.
         stepping: equal steps of dt, or steps chosen within each interval.
+        checkpoints: states that reverse mode keeps, at least one for each interval; twice the
+            square root of the number of steps if none is given. More cost memory and save no time.
 
     Returns:
         the last good state, the fault (code 0 if none), the snapshot after each interval with
         a leading axis of length `snapshots`, and which of these are good.
     """
 
+    segment = segment_length(steps_per_snapshot, snapshots, checkpoints)
+
     def interval(carry, start):
-        state, fault = stepping.advance(model, *carry, start, time_step, steps_per_snapshot)
+        state, fault = stepping.advance(
+            model, *carry, start, time_step, steps_per_snapshot, segment
+        )
         good = fault.code == int(FaultCode.NONE)
         return (state, fault), (model.observe(state), good)
 

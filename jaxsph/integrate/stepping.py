@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
+from .checkpoints import checkpointed_scan
 from .faults import Fault, FaultCode
 from .model import Model
 from .runge_kutta import rk4_step
@@ -30,8 +31,9 @@ class Stepping(eqx.Module):
         start: Array,
         time_step: Float[Array, ""],
         steps: int,
+        segment: int,
     ) -> tuple[Any, Fault]:
-        """The last good state of the interval and the fault (code 0 if none), in one `lax.scan`.
+        """The last good state of the interval and the fault (code 0 if none), in one scan.
 
         Args:
             model: what to integrate.
@@ -40,6 +42,7 @@ class Stepping(eqx.Module):
             start: number of the step before the interval.
             time_step: dt [s].
             steps: of dt in the interval.
+            segment: steps between two states that reverse mode keeps.
         """
 
 
@@ -58,7 +61,7 @@ def _step(model: Model, state, auxiliary, number, time, time_step):
 class FixedSteps(Stepping):
     """Equal steps of dt, the paper's."""
 
-    def advance(self, model, state, fault, start, time_step, steps):
+    def advance(self, model, state, fault, start, time_step, steps, segment):
         def step(carry, number):
             def move(carry):
                 state, auxiliary, _ = carry
@@ -66,10 +69,11 @@ class FixedSteps(Stepping):
                 return _step(model, state, auxiliary, number, time, time_step)
 
             good = carry[2].code == int(FaultCode.NONE)
-            return lax.cond(good, move, lambda carry: carry, carry), None
+            return lax.cond(good, move, lambda carry: carry, carry)
 
         numbers = start + 1 + jnp.arange(steps, dtype=jnp.int32)
-        (state, _, fault), _ = lax.scan(step, (state, model.prepare(state), fault), numbers)
+        carry = (state, model.prepare(state), fault)
+        state, _, fault = checkpointed_scan(step, carry, numbers, segment)
         return state, fault
 
 
@@ -91,7 +95,7 @@ class AutomaticSteps(Stepping):
         if self.most < 1:
             raise ValueError(f"most: at least 1, got {self.most}.")
 
-    def advance(self, model, state, fault, start, time_step, steps):
+    def advance(self, model, state, fault, start, time_step, steps, segment):
         duration = steps * time_step
 
         def going(carry):
@@ -110,11 +114,11 @@ class AutomaticSteps(Stepping):
             return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
 
         def step(carry, _):
-            return lax.cond(going(carry), move, lambda carry: carry, carry), None
+            return lax.cond(going(carry), move, lambda carry: carry, carry)
 
         zero = jnp.zeros((), time_step.dtype)
         carry = (state, model.prepare(state), fault, zero, zero)
-        carry, _ = lax.scan(step, carry, None, length=self.most * steps)
+        carry = checkpointed_scan(step, carry, jnp.arange(self.most * steps), segment)
         state, _, fault, elapsed, _ = carry
         short = going(carry)
         number = start + jnp.ceil(elapsed / time_step).astype(jnp.int32)
