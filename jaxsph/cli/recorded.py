@@ -21,7 +21,7 @@ from ..trajectory import Trajectory
 from .errors import fail
 from .options import STEPPING, print_rows, progress_bar
 
-REPORT = "report.html"  # beside the trajectory
+REPORT = "report.html"  # its name, beside the trajectory
 
 
 def simulate_and_report(
@@ -55,7 +55,10 @@ def simulate_and_report(
                 stepping=STEPPING[options.steps],
             )
             writer.finish(trajectory.metadata)
-    except (SimulationError, TrajectoryFileError) as error:
+    except SimulationError as error:
+        _report(scene, writer, {"fault": str(error)})
+        return fail("jaxsph", f"{error} {_holds(writer)}", 1)
+    except TrajectoryFileError as error:  # the disk takes no more, so no report either
         return fail("jaxsph", f"{error} {_holds(writer)}", 1)
     except KeyboardInterrupt:
         return fail("jaxsph", f"interrupted. {_holds(writer)} Go on with --resume.", 130)
@@ -63,8 +66,16 @@ def simulate_and_report(
     if options.json is not None:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
-    print_rows(_rows(results))
+    rows = _rows(results)
+    print_rows({**rows, "report": str(_report(scene, writer, rows))})
     return 0
+
+
+def _report(scene: Scene, writer: TrajectoryWriter, rows: dict[str, str]) -> Path:
+    from ..report.run_report import write_run_report  # matplotlib takes its time to load
+
+    path, rows = writer.path.with_name(REPORT), {**rows, "trajectory": writer.path.name}
+    return write_run_report(path, writer.path, float(scene.mass), rows, environment())
 
 
 class _Progress:

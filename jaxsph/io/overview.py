@@ -91,6 +91,8 @@ def read_snapshot(path: str | os.PathLike, number: int = -1) -> tuple[float, Sna
         TrajectoryFileError: if the file is not a whole trajectory file with that snapshot in it.
     """
     with opened(Path(path)) as (file, count):
+        if count == 0:
+            raise TrajectoryFileError(f"{path}: holds no snapshot yet; run its scene anew.")
         if not -count <= number < count:
             raise TrajectoryFileError(
                 f"{path}: holds no snapshot of number {number}; it has {count} of them, from 0 on."
