@@ -134,9 +134,10 @@ def _errors(scene: Scene, trajectory: Trajectory) -> dict[str, float] | None:
 
 def _rows(results: dict[str, Any]) -> dict[str, str]:
     """Results as they are shown to people."""
+    first = f"from step {results['first_step']} " if results["first_step"] else ""
     rows = {
         "particles": f"{results['particles']}",
-        "steps": f"{results['steps']}, to t = {results['end_time']:g} s",
+        "steps": f"{results['steps']}, {first}to t = {results['end_time']:g} s",
         "run": f"{results['run_seconds']:.3g} s",
         "compile": f"{results['compile_seconds']:.3g} s",
         "per particle and step": f"{results['microseconds_per_particle_and_step']:.3g} us",

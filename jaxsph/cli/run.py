@@ -32,7 +32,10 @@ _STEPS_HELP = (
     "fixed: dt throughout; automatic: as long as sound, viscosity, tension and forces allow "
     "(default: fixed; give it again with --resume)"
 )
-_MARGIN_HELP = "room in the neighbour list over its need at the start (default: the scene's)"
+_MARGIN_HELP = (
+    "room in the neighbour list over its need at the start; another one rounds sums otherwise "
+    "(default: the scene's)"
+)
 
 
 def add_to(commands) -> None:

@@ -20,7 +20,8 @@ from .snapshot import label_panel, panel_size
 from .style import INK, TEXT, sheet
 
 _DPI = 100
-_TAILS = (0.002, 0.998)  # quantiles of each frame that the colours span; a lone particle may be out
+_TAILS = (0.01, 0.99)  # quantiles of the whole run that the colours span; an impact may be out
+_LADDER = np.linspace(0.0, 1.0, 201)  # quantiles of a frame that stand for its values
 
 
 def animate(
@@ -33,8 +34,9 @@ def animate(
 ) -> Path:
     """Draw the particles of a trajectory file, coloured by a field, at all its times.
 
-    Colours and axes span the whole run. The file is read twice, one snapshot at a time. The frames
-    of a GIF are held in memory until its end, about a megabyte each; those of an MP4 are not.
+    Axes span the whole run, colours all but one percent of its values at either end. The file is
+    read twice, one snapshot at a time. The frames of a GIF are held in memory until its end, about
+    a megabyte each; those of an MP4 are not.
 
     Args:
         source: the trajectory file.
@@ -123,15 +125,14 @@ class _View:
             position, value = _shown(block, field)
             lows.append(position.min(axis=0))
             highs.append(position.max(axis=0))
-            values.append(np.quantile(value, _TAILS))
+            values.append(np.quantile(value, _LADDER))
             times.append(block.time[0])
-        scene = str(block.metadata.get("scene", ""))
         interval = times[1] - times[0] if len(times) > 1 else 1.0
         return cls(
             np.min(lows, axis=0),
             np.max(highs, axis=0),
-            (float(np.min(values)), float(np.max(values))),
-            scene,
+            tuple(np.quantile(values, _TAILS)),
+            str(block.metadata.get("scene", "")),
             int(np.clip(1 - np.floor(np.log10(interval)), 0, 9)),
         )
 

@@ -10,6 +10,8 @@ import numpy as np
 from ..trajectory import Snapshot, Trajectory
 from .style import MAGNITUDE_MAP, SIGNED_MAP
 
+_MATTERS = 0.1  # a sign does, if it reaches so far of the way that the other one does
+
 
 @dataclass(frozen=True)
 class ParticleField:
@@ -19,7 +21,7 @@ class ParticleField:
         name: as users type it.
         label: with its unit, for a colour bar.
         value: takes it from a snapshot, (N,), or from a trajectory, (S, N).
-        signed: whether zero is in its middle where it has both signs.
+        signed: whether zero is in its middle where both signs matter.
     """
 
     name: str
@@ -29,7 +31,7 @@ class ParticleField:
 
     def colours(self, low: float, high: float) -> tuple[str, tuple[float, float]]:
         """Colour map and its limits for values from low to high."""
-        if self.signed and low < 0.0 < high:
+        if self.signed and min(-low, high) > _MATTERS * max(-low, high):
             high = max(-low, high)
             return SIGNED_MAP, (-high, high)
         if not high > low:  # one value only, a quiet start say

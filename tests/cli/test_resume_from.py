@@ -34,7 +34,8 @@ def test_it_repeats_the_run_bit_by_bit(folder, monkeypatch, capsys, start):
     assert again.metadata.get("resumed_from_step", 0) == first
     assert read_overview(f"{out}/trajectory.h5").complete
     assert (folder / out / "report.html").exists()
-    assert "12/12" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "12/12" in printed.err and (f"from step {first} to t" in printed.out) == (first > 0)
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def test_frames_show_the_snapshots_on_one_scale(tmp_path, monkeypatch):
     assert across[0] < shown[..., 0].min() and shown[..., 0].max() < across[1]
     assert up[0] < shown[..., 1].min() and shown[..., 1].max() < up[1]
     outside = (run.density[::2] < colours[0]) | (run.density[::2] > colours[1])
-    assert outside.mean() < 0.004  # a lone particle at each end of a frame at most
+    assert 0.01 < outside.mean() < 0.03  # one percent at each end
 
 
 def test_mp4(tmp_path):

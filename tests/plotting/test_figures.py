@@ -51,3 +51,4 @@ def test_one_value_only_has_colours_too():
     assert low < 0.0 < high
     assert FIELDS["pressure"].colours(-2.0, 1.0)[1] == (-2.0, 2.0)
     assert FIELDS["pressure"].colours(1.0, 2.0)[1] == (1.0, 2.0)
+    assert FIELDS["pressure"].colours(-1.0, 20.0) == ("viridis", (-1.0, 20.0))
