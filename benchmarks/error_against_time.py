@@ -27,10 +27,7 @@ from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
-from jaxsph.scenes import Scene, taylor_green_solution
-from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
-from jaxsph_rom.hyper import LinearClosure, TrainedFlow, mapped_run, train_flows
-from jaxsph_rom.report.figures.style import (
+from jaxsph.plotting.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -40,6 +37,9 @@ from jaxsph_rom.report.figures.style import (
     save,
     sheet,
 )  # fmt: skip
+from jaxsph.scenes import Scene, taylor_green_solution
+from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
+from jaxsph_rom.hyper import LinearClosure, TrainedFlow, mapped_run, train_flows
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell, write_json

@@ -33,10 +33,10 @@ from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, integrate
 from jaxsph.io import check_target
 from jaxsph.metrics import kinetic_energy
+from jaxsph.plotting import style
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, ReducedModel
 from jaxsph_rom.hyper import QuadraticSystem, TensorModel
-from jaxsph_rom.report.figures import style
 
 from . import measure
 

@@ -3,6 +3,7 @@
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import warnings
@@ -18,7 +19,9 @@ from jaxsph.cli import SCALES, main
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, SimulationError
 from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
+from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import SCENES, taylor_green
+from tests.pages import checked_page
 
 TINY = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.1", "--arrangement", "lattice"]
 
@@ -64,7 +67,24 @@ def test_run(tmp_path, capsys):
     assert results["dtype"] == "float64"
     for word in ("particles", "steps", "compile", "per particle and step", "velocity error"):
         assert word in captured.out
-    assert "kinetic energy" in captured.err  # beside the progress bar
+    bar = captured.err.splitlines()[-1].rpartition("\r")[2]
+    assert re.search(r"10/10 \[\d\d:\d\d<\d\d:\d\d", bar)  # time taken and time left
+    energy = kinetic_energy(trajectory.velocity[-1], 1000.0 / 256)
+    assert f"kinetic energy {energy:.4g} J/m]" in bar
+
+
+def test_every_run_leaves_a_page(tmp_path, capsys):
+    assert main([*TINY, "--reynolds", "50"]) == 0
+    printed = capsys.readouterr().out
+    assert "out/taylor-green/report.html" in printed
+    page = checked_page(tmp_path / "out" / "taylor-green" / "report.html")
+    assert len(page.figures) == 2
+    for word in ("taylor-green", "reynolds", "PressureForce", "jaxlib", "cores", "Kinetic energy"):
+        assert word in page.text
+    for name in ("run", "compile", "velocity error", "kinetic energy error"):
+        value = page.cells[page.cells.index(name) + 1]
+        assert f"{name:22} {value}" in printed
+    assert str(tmp_path) not in page.source and platform.node() not in page.text
 
 
 def test_single_precision_stays_inside(capsys):
@@ -133,6 +153,8 @@ def test_fault_in_mid_run_then_resumed(capsys, monkeypatch):
     assert 0.0 < read.time[-1] < 0.1
     assert error.startswith("jaxsph: error: step ")
     assert f"run/trajectory.h5 holds the snapshots up to t = {read.time[-1]:.6g} s." in error
+    page = checked_page(Path("run/report.html"))
+    assert page.cells[page.cells.index("fault") + 1].startswith("step ") and len(page.figures) == 2
     resume = ["run", "taylor-green", "--resume", "run/trajectory.h5", "--capacity-margin", "1.3"]
     assert main(resume) == 0
     resumed = read_trajectory("run/trajectory.h5")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxsph_rom.report.figures.style import (
+from jaxsph.plotting.style import (
     BLACK,
     BLUE,
     FAINT,

@@ -1,9 +1,13 @@
-"""Files: trajectories in HDF5."""
+"""Files: trajectories in HDF5, and what ParaView reads."""
 
+from .growing_file import check_target as check_target
+from .overview import Overview as Overview
+from .overview import read_overview as read_overview
+from .overview import read_snapshot as read_snapshot
 from .snapshot_blocks import snapshot_blocks as snapshot_blocks
 from .trajectory_file import Checkpoint as Checkpoint
 from .trajectory_file import TrajectoryFileError as TrajectoryFileError
 from .trajectory_file import read_checkpoint as read_checkpoint
 from .trajectory_file import read_trajectory as read_trajectory
 from .trajectory_writer import TrajectoryWriter as TrajectoryWriter
-from .trajectory_writer import check_target as check_target
+from .vtkhdf import write_vtkhdf as write_vtkhdf

@@ -13,7 +13,7 @@ from ..trajectory import Trajectory
 from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient
 
 
-def snapshot_blocks(path: str | os.PathLike, size: int) -> Iterator[Trajectory]:
+def snapshot_blocks(path: str | os.PathLike, size: int, every: int = 1) -> Iterator[Trajectory]:
     """The trajectory in a file in consecutive blocks of at most `size` snapshots.
 
     Put together, the blocks are what `read_trajectory` reads; each has the metadata of all. What a
@@ -22,29 +22,33 @@ def snapshot_blocks(path: str | os.PathLike, size: int) -> Iterator[Trajectory]:
     Args:
         path: of the file.
         size: snapshots in a block; the last one may have fewer.
+        every: take every N-th snapshot, from the first on.
 
     Raises:
-        ValueError: if the size is below 1.
+        ValueError: if one of these numbers is below 1.
         TrajectoryFileError: if the file is not a whole trajectory file with a snapshot in it, or,
             between blocks, if it was replaced by another run.
     """
     if size < 1:
         raise ValueError(f"size: {size} snapshots a block; give at least 1.")
+    if every < 1:
+        raise ValueError(f"every: every {every}-th snapshot; give at least 1.")
     path = Path(path)
     count, parameters, metadata = _overview(path)
 
     def read(path: Path, start: int) -> Trajectory:
-        stop = min(start + size, count)
+        stop = min(start + size * every, count)
+        block = slice(start, stop, every)
         with opened(path) as (file, there):
             if there < stop or file.attrs["parameters"] != parameters:
                 raise TrajectoryFileError(
                     f"{path}: was replaced by another run while it was read; read it anew."
                 )
-            fields = {name: file[name][start:stop] for name in ("time", *FIELDS)}
-            coordinates = file["coordinates"][start:stop] if "coordinates" in file else None
+            fields = {name: file[name][block] for name in ("time", *FIELDS)}
+            coordinates = file["coordinates"][block] if "coordinates" in file else None
             return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
 
-    starts = range(0, count, size)
+    starts = range(0, count, size * every)
     return (patient(functools.partial(read, start=start))(path) for start in starts)
 
 

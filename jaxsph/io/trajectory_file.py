@@ -49,7 +49,7 @@ class Checkpoint:
         steps: number of the run's last step.
         steps_per_snapshot: between snapshots.
         complete: whether the run has ended.
-        step: number of the last stored step, -1 if there is none.
+        step: number of the last stored step, or of the one asked for; -1 if there is none.
         state: the particles at that step.
     """
 
@@ -71,13 +71,13 @@ def patient(read):
     """A file that grows can look damaged for a moment; read it a few times before giving up."""
 
     @functools.wraps(read)
-    def attempt(path):
+    def attempt(path, *arguments):
         for pause in (0.02, 0.05, 0.1):  # s
             try:
-                return read(path)
+                return read(path, *arguments)
             except _Damaged:
                 time.sleep(pause)
-        return read(path)
+        return read(path, *arguments)
 
     return attempt
 
@@ -102,14 +102,21 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
 
 
 @patient
-def read_checkpoint(path: str | os.PathLike) -> Checkpoint:
-    """What a file says of its run, and the particles of its last snapshot.
+def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpoint:
+    """What a file says of its run, and the particles of a snapshot.
+
+    Args:
+        path: of the file.
+        step: of the snapshot; the last one if none is given.
 
     Raises:
-        TrajectoryFileError: if the file is not a whole trajectory file.
+        TrajectoryFileError: if the file is not a whole trajectory file, or has no snapshot of that
+            step.
     """
     with opened(Path(path)) as (file, count):
         state = None
+        if step is not None:
+            count = count_up_to(path, file["step"][:count], step)
         if count:
             position, velocity, density, _ = (file[name][count - 1] for name in FIELDS)
             state = ParticleState(position, velocity, density)
@@ -123,6 +130,18 @@ def read_checkpoint(path: str | os.PathLike) -> Checkpoint:
             step=int(file["step"][count - 1]) if count else -1,
             state=state,
         )
+
+
+def count_up_to(path: str | os.PathLike, stored: np.ndarray, step: int) -> int:
+    """The number of snapshots up to that of a step."""
+    found = np.flatnonzero(stored == step)
+    if len(found):
+        return int(found[0]) + 1
+    there = "none at all"
+    if len(stored):
+        there = f"those of steps {', '.join(map(str, stored[:3]))}"
+        there += f", ... to {stored[-1]}" if len(stored) > 3 else ""
+    raise TrajectoryFileError(f"{path}: holds no snapshot of step {step}; it has {there}.")
 
 
 @contextmanager

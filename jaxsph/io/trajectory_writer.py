@@ -7,11 +7,8 @@ steps says how many snapshots are whole.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import re
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +17,17 @@ import numpy as np
 
 from ..environment import versions
 from ..trajectory import Snapshot
+from .growing_file import COMPRESSION, abandon, add_dataset, begin, check_target, unwritable
 from .trajectory_file import (
     FORMAT,
     SCHEMA_VERSION,
     UNITS,
     TrajectoryFileError,
+    count_up_to,
     opened,
 )
 
-# gzip takes a third longer to write than lzf (6 against 4.5 ms a snapshot of 4096 particles) and
-# saves a sixth instead of a tenth; any HDF5 reads it.
-_COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-_OPENING = {"libver": "v110", "locking": "best-effort"}  # v110: the oldest that can grow this way
+_ORIGIN = ("scene", "parameters")  # metadata that hold for a part of a run too
 _METADATA_SPACE = 16384  # bytes; the attribute keeps the size it has at the start
 
 
@@ -42,7 +38,8 @@ class TrajectoryWriter:
             trajectory = run_scene(scene, recorder=writer)
             writer.finish(trajectory.metadata)
 
-    Make one by `create` or `append_to`. `last_step` is the last step stored, -1 if there is none.
+    Make one by `create`, `append_to` or `branch`. `last_step` is the last step stored, -1 if there
+    is none.
     """
 
     def __init__(self, path: Path, file: h5py.File):
@@ -66,7 +63,8 @@ class TrajectoryWriter:
 
         Args:
             path: of the file.
-            scene: gives name, parameters, steps, and the particles' number and precision.
+            scene: gives name, parameters, steps, effects, the mass of a particle [kg] (None where
+                they have none), and the particles' number and precision.
             modes: number of reduced coordinates that snapshots carry, if any.
             metadata: kept with the trajectory, JSON-like.
             overwrite: whether an existing file may be replaced.
@@ -94,15 +92,18 @@ class TrajectoryWriter:
             file.attrs["steps"] = int(scene.steps)
             file.attrs["steps_per_snapshot"] = int(scene.steps_per_snapshot)
             file.attrs["complete"] = False
+            file.attrs["effects"] = json.dumps([effect.name for effect in scene.effects])
+            if scene.mass is not None:
+                file.attrs["mass"] = float(scene.mass)
             text = _to_json(metadata)
             space = max(_METADATA_SPACE, 2 * len(text))
             file.attrs.create("metadata", np.bytes_(text), dtype=f"S{space}")
             for name, shape in shapes.items():
-                _add_dataset(file, name, shape, np.dtype(state.position.dtype), **_COMPRESSION)
-            _add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
-            _add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
+                add_dataset(file, name, shape, np.dtype(state.position.dtype), **COMPRESSION)
+            add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
+            add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
 
-        return cls(path, _begin(path, fill))
+        return cls(path, begin(path, fill))
 
     @classmethod
     def append_to(cls, path: str | os.PathLike) -> TrajectoryWriter:
@@ -119,14 +120,50 @@ class TrajectoryWriter:
         with opened(path) as (source, count):
 
             def fill(file):
-                for name, value in source.attrs.items():
-                    file.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
-                file.attrs["complete"] = False
+                _copy_attributes(source, file)
                 for name in source:
                     source.copy(name, file)
                     file[name].resize(count, 0)
 
-            return cls(path, _begin(path, fill))
+            return cls(path, begin(path, fill))
+
+    @classmethod
+    def branch(
+        cls, source: str | os.PathLike, path: str | os.PathLike, step: int
+    ) -> TrajectoryWriter:
+        """A new file that goes on from a snapshot of another one, which stays as it is.
+
+        It begins with that one's snapshots up to this; later ones are not copied.
+
+        Args:
+            source: of the other file.
+            path: of the new one; folders are made as needed.
+            step: of the snapshot to go on from.
+
+        Raises:
+            TrajectoryFileError: if the source has no snapshot of that step or cannot be read, or
+                if the new file exists or cannot be made.
+        """
+        path = Path(path)
+        check_target(path, overwrite=False)
+        with opened(Path(source)) as (old, stored):
+            count = count_up_to(source, old["step"][:stored], step)
+
+            def fill(file):
+                _copy_attributes(old, file)
+                metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
+                file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
+                for name in old:
+                    like = old[name]
+                    add_dataset(
+                        file, name, like.shape[1:], like.dtype, fillvalue=like.fillvalue,
+                        **(COMPRESSION if like.compression else {}),
+                    )  # fmt: skip
+                    file[name].resize(count, 0)
+                    for k in range(count):
+                        file[name][k] = like[k]
+
+            return cls(path, begin(path, fill))
 
     def append(self, step: int, time: float, snapshot: Snapshot) -> None:
         """Store a snapshot; it is safe once this returns. The last one again is left out.
@@ -145,8 +182,8 @@ class TrajectoryWriter:
                     dataset[self._count] = np.asarray(value)
                     dataset.flush()
         except (OSError, RuntimeError) as error:
-            _abandon(self._file)
-            raise _unwritable(self.path, error) from None
+            abandon(self._file)
+            raise unwritable(self.path, error) from None
         self._count, self.last_step, self.last_time = self._count + 1, step, time
 
     def finish(self, metadata: dict | None = None) -> None:
@@ -179,80 +216,12 @@ class TrajectoryWriter:
         self.close()
 
 
-def check_target(path: str | os.PathLike, overwrite: bool = True) -> None:
-    """Make sure, leaving no trace, that a file can be written there.
-
-    Raises:
-        TrajectoryFileError: if it exists and may not be replaced, or its folder does not serve.
-    """
-    path = Path(path)
-    try:
-        if path.is_dir():
-            raise TrajectoryFileError(f"{path}: is a folder; name a file.")
-        if not overwrite and path.exists():
-            raise TrajectoryFileError(
-                f"{path}: exists already; choose another folder, replace it with overwrite "
-                "(--overwrite) or go on with it (--resume)."
-            )
-        folder = path.parent
-        while not folder.exists():
-            folder = folder.parent
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise _unwritable(path, error) from None
-
-
-def _begin(path: Path, fill) -> h5py.File:
-    """A file that `fill` fills, put in its place once it can grow safely."""
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = h5py.File(part, "w", **_OPENING)
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    try:
-        fill(file)
-        file.swmr_mode = True
-        os.replace(part, path)
-    except BaseException as error:
-        _abandon(file)
-        part.unlink(missing_ok=True)
-        if isinstance(error, (OSError, RuntimeError)):
-            raise _unwritable(path, error) from None
-        raise
-    return file
-
-
-def _abandon(file: h5py.File) -> None:
-    """Close without writing: HDF5 never lets go of what it failed to write, so it goes nowhere."""
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nowhere, file.id.get_vfd_handle())
-    os.close(nowhere)
-    with contextlib.suppress(OSError, RuntimeError):
-        file.close()
-
-
-def _add_dataset(file, name, shape, dtype, **options) -> None:
-    dataset = file.create_dataset(
-        name,
-        (0, *shape),
-        dtype,
-        maxshape=(None, *shape),
-        chunks=(1, *shape) if shape else (256,),
-        **options,
-    )
-    dataset.attrs["unit"] = UNITS[name]
+def _copy_attributes(source: h5py.File, file: h5py.File) -> None:
+    """What a file says of its run, which is not complete."""
+    for name, value in source.attrs.items():
+        file.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
+    file.attrs["complete"] = False
 
 
 def _to_json(value: Any) -> str:
     return json.dumps(value, default=lambda array: np.asarray(array).tolist())
-
-
-def _unwritable(path: Path, error: Exception) -> TrajectoryFileError:
-    quoted = re.search(r"error message = '([^']*)'", str(error))  # as HDF5 has it
-    reason = quoted[1] if quoted else getattr(error, "strerror", None) or str(error)
-    return TrajectoryFileError(
-        f"{path}: cannot be written ({reason}); choose a folder that you may write to and that "
-        "has room."
-    )

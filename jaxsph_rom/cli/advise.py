@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from jaxsph.cli import print_rows
 from jaxsph.io import check_target
 
 from .. import advice
 from ..advice import Advice, Row
-from .options import print_rows
 
 
 def add_to(commands) -> None:

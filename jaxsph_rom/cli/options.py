@@ -175,9 +175,3 @@ def bar(label: str, total: int, done: int = 0):
         desc=label, total=total, initial=done, unit="step", file=sys.stderr, mininterval=interval
     ) as shown:
         yield shown.update
-
-
-def print_rows(rows: dict[str, str]) -> None:
-    """Names and values, aligned."""
-    for name, value in rows.items():
-        print(f"{name:22} {value}")

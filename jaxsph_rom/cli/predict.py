@@ -11,7 +11,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph.cli import fail, positive_float, positive_int, seed
+from jaxsph.cli import fail, positive_float, positive_int, print_rows, seed
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
 from jaxsph.io import check_target
@@ -19,7 +19,7 @@ from jaxsph.io import check_target
 from ..hyper import Prediction, TrainedFlow, load_flow, save_prediction
 from ..hyper.member_files import write_fields, write_tracers
 from ..report.plain import plain
-from .options import bar, distinct, print_rows
+from .options import bar, distinct
 from .train import print_errors
 
 _MOST = 100_000  # Reynolds numbers in a call

@@ -54,8 +54,8 @@ def add_to(commands) -> None:
         "run",
         help="train, predict, compare with the full model",
         description="Run full models, build reduced models from them, run these at other Reynolds "
-        "numbers, and compare: a table of errors and times, figures and report.json. Runs are "
-        "kept in the output folder: the same command goes on where it was cut short.",
+        "numbers, and compare: a table of errors and times, figures, report.json and report.html. "
+        "Runs are kept in the output folder: the same command goes on where it was cut short.",
     )
     run.set_defaults(command=_run)
     add = run.add_argument
@@ -113,6 +113,7 @@ def _run(options) -> int:
     report = folder / "report.json" if options.json is None else options.json
     check_target(report)
     check_target(folder / "report.json")
+    check_target(folder / "report.html")
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         experiments = plan.experiments()
@@ -134,7 +135,7 @@ def _run(options) -> int:
     print(format_table([outcome.case for outcome in outcomes]))
     if plan.judged_from:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
-    print(f"\nreport: {report}\nfigures: {folder}/*.png")
+    print(f"\nreport: {folder / 'report.html'}, {report}\nfigures: {folder}/*.png")
     return 0
 
 

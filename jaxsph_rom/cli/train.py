@@ -10,7 +10,7 @@ from typing import Any
 import jax
 
 from jaxsph import Trajectory
-from jaxsph.cli import fail, positive_int
+from jaxsph.cli import fail, positive_int, print_rows
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
@@ -30,7 +30,6 @@ from .options import (
     distinct,
     formulation,
     planned,
-    print_rows,
     scene_maker,
 )
 

@@ -35,6 +35,8 @@ class _Recorded:
     steps: int
     steps_per_snapshot: int
     state: ParticleState
+    effects: tuple[()] = ()  # a reduced model has none
+    mass: None = None  # what points and tracers stand for differs from run to run
 
 
 def write_fields(

@@ -48,7 +48,7 @@ def format_table(cases: Sequence[Case]) -> str:
         Lines joined by newlines, none at the end.
     """
     cases = list(cases)
-    body = [_cells(case) for case in cases]
+    body = [cells(case) for case in cases]
     headers = [[column[0] for column in COLUMNS], [column[1] for column in COLUMNS]]
     widths = [max(map(len, column)) for column in zip(*headers, *body, strict=True)]
     gap = "  " if sum(widths) + 2 * (len(widths) - 1) <= WIDTH else " "
@@ -56,25 +56,25 @@ def format_table(cases: Sequence[Case]) -> str:
     if excess > 0:
         widths[PROJECTION] = max(len(headers[1][PROJECTION]), widths[PROJECTION] - excess)
 
-    def line(cells: Sequence[str]) -> str:
+    def line(texts: Sequence[str]) -> str:
         aligned = (
-            f"{cell[:width]:{column[2]}{width}}"
-            for cell, width, column in zip(cells, widths, COLUMNS, strict=True)
+            f"{text[:width]:{column[2]}{width}}"
+            for text, width, column in zip(texts, widths, COLUMNS, strict=True)
         )
         return gap.join(aligned).rstrip()
 
     lines = [line(headers[0]), line(headers[1])]
     lines.append("-" * max(map(len, [*lines, *map(line, body)])))
     rows = zip(cases, body, strict=True)
-    for heading, group in itertools.groupby(rows, key=lambda row: _heading(row[0])):
-        lines += [*textwrap.wrap(heading, WIDTH), *(line(cells) for _, cells in group)]
-    faults = list(dict.fromkeys(_fault(case) for case in cases if case.fault))
-    for fault in faults:
-        lines += textwrap.wrap(fault, WIDTH, subsequent_indent="    ")
+    for name, group in itertools.groupby(rows, key=lambda row: heading(row[0])):
+        lines += [*textwrap.wrap(name, WIDTH), *(line(texts) for _, texts in group)]
+    for text in dict.fromkeys(fault(case) for case in cases if case.fault):
+        lines += textwrap.wrap(text, WIDTH, subsequent_indent="    ")
     return "\n".join(lines)
 
 
-def _cells(case: Case) -> list[str]:
+def cells(case: Case) -> list[str]:
+    """A case as the texts of its columns."""
     return [
         f"{case.reynolds:g}",
         "predicted" if case.predicted else "trained",
@@ -120,9 +120,11 @@ def _verdict(case: Case) -> str:
     return f"unstable, {case.fault_time:.3g} s"
 
 
-def _heading(case: Case) -> str:
+def heading(case: Case) -> str:
+    """What cases have in common that stand in one block."""
     return f"{case.scene}: {case.inner_product} inner product, hyper-reduction {case.hyper}"
 
 
-def _fault(case: Case) -> str:
+def fault(case: Case) -> str:
+    """What made a case unstable."""
     return f"Re {case.reynolds:g}, M {case.modes}, {case.projection}: {case.fault}"

@@ -1,4 +1,4 @@
-"""The report of a study: table, figures and `report.json`."""
+"""The report of a study: figures, `report.json` and `report.html`."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ from ..basis import cumulative_energy
 from ..report import (
     Case,
     Profile,
+    Shown,
     centre_line_profiles,
     discrepancy_history,
     field_snapshots,
     modes,
     singular_values,
+    write_html_report,
     write_report,
 )
 from .study import Experiment, Outcome, Study
 
 _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
+_SETTINGS = ("advection", "map", "interpolation", "spline_order", "judged_from")
 _LISTED_MODES = (2, 5, 10, 20, 30)
 
 
@@ -37,15 +40,15 @@ def write_study(
     json_path: Path | None = None,
     profile_time: float | None = None,
 ) -> dict[str, Any]:
-    """Write `report.json` and the figures of a study into a folder.
+    """Write the figures of a study, `report.json` and `report.html` into a folder.
 
     Args:
         study: made the runs.
         experiments: each with a basis of its own; the figures of bases are numbered if there are
             several.
         outcomes: of all experiments.
-        folder: where figures go, and the report unless `json_path` is given.
-        json_path: where the report goes.
+        folder: where figures and `report.html` go, and `report.json` unless `json_path` is given.
+        json_path: where `report.json` goes.
         profile_time: at which profiles and fields are shown [s]; half the run if none is given.
 
     Returns:
@@ -53,10 +56,12 @@ def write_study(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    bases = []
+    bases: list[dict[str, Any]] = []
+    basis_figures: list[Shown] = []
     for number, experiment in enumerate(experiments):
         suffix = f"_{number + 1}" if len(experiments) > 1 else ""
-        bases.append(_basis_figures(study, experiment, folder, suffix))
+        basis_figures += _basis_figures(study, experiment, folder, suffix)
+        bases.append(_basis_energies(study, experiment))
     first = study.scene(experiments[0].trained_on[0])
     if profile_time is None:
         profile_time = 0.5 * first.end_time
@@ -69,36 +74,39 @@ def write_study(
         "spline_order": study.spline_order,
         "judged_from": study.judged_from,
     }
-    discrepancy_history(
+    history = discrepancy_history(
         [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
         folder / "discrepancy.png",
     )
-    _profiles(study, outcomes, folder / "centre_line.png", profile_time)
+    profiles = _profiles(study, outcomes, folder / "centre_line.png", profile_time)
+    shown = [
+        (history, "Relative discrepancy of each reduced run from its full model over time."),
+        (profiles, "Velocity norm and pressure on the line that runs are compared on."),
+    ]
     if first.space.box.dim == 2:
-        _fields(study, outcomes, folder, profile_time)
-    write_report(
-        json_path or folder / "report.json",
-        [outcome.case for outcome in outcomes],
-        environment(),
-        extra,
-    )
+        shown += _fields(study, outcomes, folder, profile_time)
+    cases, made_on = [outcome.case for outcome in outcomes], environment()
+    write_report(json_path or folder / "report.json", cases, made_on, extra)
+    settings = {**first.parameters, **{name: extra[name] for name in _SETTINGS}}
+    settings.pop("reynolds", None)  # each case has its own
+    write_html_report(folder / "report.html", cases, shown + basis_figures, settings, made_on)
     return extra
 
 
-def _basis_figures(
-    study: Study, experiment: Experiment, folder: Path, suffix: str
-) -> dict[str, Any]:
-    """Singular values and modes of an experiment's basis; its cumulative energies."""
+def _basis_figures(study: Study, experiment: Experiment, folder: Path, suffix: str) -> list[Shown]:
+    """Singular values and modes of an experiment's basis."""
     basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
-    singular_values(
+    trained = f"trained on Re {', '.join(f'{number:g}' for number in experiment.trained_on)}"
+    decay = singular_values(
         lagrangian.singular_values, basis.singular_values, folder / f"singular_values{suffix}.png"
     )
+    figures = [(decay, f"Singular values and cumulative energy of the basis {trained}.")]
     numbers = tuple(n for n in _SHOWN_MODES if n <= basis.size)
     points = np.asarray(study.reference(experiment).points)
     start = study.full(experiment.trained_on[0]).position[0]
     if points.shape[1] == 2:
         shown = slice(max(numbers))
-        modes(
+        shapes = modes(
             [
                 ("Lagrangian space", start, lagrangian.modes[:, :, shown]),
                 ("reference space", points, basis.modes[:, :, shown]),
@@ -106,6 +114,13 @@ def _basis_figures(
             numbers,
             folder / f"modes{suffix}.png",
         )
+        figures.append((shapes, f"Modes of the basis {trained}."))
+    return figures
+
+
+def _basis_energies(study: Study, experiment: Experiment) -> dict[str, Any]:
+    """The cumulative energies of an experiment's basis [%]."""
+    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
     return {
         "trained_on": list(experiment.trained_on),
         "cumulative_energy_percent": {
@@ -137,7 +152,7 @@ def _by_reynolds(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
     return grouped
 
 
-def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float) -> None:
+def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float) -> Path:
     profiles = []
     several = len({o.case.modes for o in outcomes}) > 1
     for reynolds, group in _by_reynolds(outcomes).items():
@@ -161,10 +176,11 @@ def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float
                 np.asarray(exact.pressure(line, full.time[k], viscosity, density)),
             )
         profiles.append(Profile(reynolds, line[:, 1], curves, time=float(full.time[k])))
-    centre_line_profiles(profiles, path)
+    return centre_line_profiles(profiles, path)
 
 
-def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float) -> None:
+def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float) -> list[Shown]:
+    shown = []
     for reynolds, group in _by_reynolds(outcomes).items():
         full = study.full(reynolds)
         k = full.nearest(time)
@@ -174,7 +190,10 @@ def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float
                 label = f"{_label(outcome.case)}, M = {outcome.case.modes}"
                 row = outcome.trajectory.nearest(full.time[k])
                 rows.append(_row(label, outcome.trajectory, row))
-        field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")
+        file = field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")
+        caption = f"Velocity norm and pressure at Re {reynolds:g}, t = {full.time[k]:.4g} s."
+        shown.append((file, caption))
+    return shown
 
 
 def _row(label, trajectory, k):

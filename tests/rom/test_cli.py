@@ -7,6 +7,7 @@ import pytest
 from jaxsph_rom import ConvectiveMemory, SpectralMemory
 from jaxsph_rom.cli import main
 from jaxsph_rom.cli.run import memory_length
+from tests.pages import checked_page
 
 SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice"]
 KEYS = {
@@ -36,6 +37,15 @@ def test_a_study_from_one_line(tmp_path, capsys):
     }  # fmt: skip
     table = capsys.readouterr().out
     assert "150" in table and "galerkin" in table
+    page = checked_page(tmp_path / "report.html")
+    assert len(page.figures) == len(figures)
+    assert set(page.figures) == {path.read_bytes() for path in tmp_path.glob("*.png")}
+    for line in table.splitlines()[4:6]:  # each row of the table, a cell for a cell
+        words = line.split()
+        start = page.cells.index(words[3]) - 3
+        assert page.cells[start : start + len(words)] == words
+    for word in ("reduced [s]", "velocity peak %", "energy inner product", "jaxlib", "cores"):
+        assert word in page.text
 
     # the same line again computes nothing anew
     stamps = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.h5")}
@@ -53,8 +63,19 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ([*SMALL, "--modes", "0"], "--modes"),
         ([*SMALL, "--modes", "5000"], "5000"),
         ([*SMALL, "--interpolation", "polynomials", "--spline-order", "2"], "need an odd one"),
-        (["run", "open-cavity", "--interpolation", "polynomials", "--settling", "0.01",
-          "--resolution", "32"], "a lattice that fills the box"),
+        (
+            [
+                "run",
+                "open-cavity",
+                "--interpolation",
+                "polynomials",
+                "--settling",
+                "0.01",
+                "--resolution",
+                "32",
+            ],
+            "a lattice that fills the box",
+        ),
         ([*SMALL, "--h-over-dx", "9"], "too small"),
         ([*SMALL, "--time-step", "1"], "stability limit"),
         ([*SMALL, "--tau", "x"], "--tau: a time in s, auto or convective, got 'x'"),

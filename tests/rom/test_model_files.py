@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from jaxsph.cli import main as look
 from jaxsph.io import read_trajectory
 from jaxsph_rom.cli import main
 from jaxsph_rom.hyper import load_flow, load_prediction
@@ -87,6 +88,13 @@ def test_fields_and_tracers_as_trajectories(folder, tmp_path, capsys):
     wanted = tracers.velocity[0] * (tracers.time[1] - tracers.time[0])
     np.testing.assert_allclose(moved, wanted, atol=0.02 * np.abs(wanted).max())
     assert tracers.metadata["tracers"]
+    for kind in ("fields", "tracers"):  # they open as runs do
+        file = str(tmp_path / kind / "re-300.h5")
+        for command in ("show", "export", "animate"):
+            assert look([command, file]) == 0
+    shown = capsys.readouterr().out
+    assert "30, in 2 dimensions" in shown and "not recorded" in shown
+    assert "kinetic energy" not in shown  # the mass of a tracer means nothing
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from .style import (
+from jaxsph.plotting.style import (
     BLACK,
     BLUE,
     GREEN,

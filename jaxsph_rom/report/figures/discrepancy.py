@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from .style import dress, finite_range, legend_below, line_style, save, sheet
+from jaxsph.plotting.style import dress, finite_range, legend_below, line_style, save, sheet
 
 DECADES = 1.5  # a range of values wider than this is drawn on a logarithmic axis
 DEEPEST, HIGHEST = 1e-4, 1e4  # percent; start-up round-off and blow-ups are cut off there

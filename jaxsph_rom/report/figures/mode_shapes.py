@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .particles import draw_particles, fit_squares, plane
-from .style import INK, SIGNED_MAP, SMALL, TEXT, finite_range, save, sheet
+from jaxsph.plotting.particles import draw_particles, fit_squares, plane
+from jaxsph.plotting.style import INK, SIGNED_MAP, SMALL, TEXT, finite_range, save, sheet
 
 COMPONENTS = ("density", "velocity x", "velocity y")
 PANEL = 1.65  # side of a square panel [inch]

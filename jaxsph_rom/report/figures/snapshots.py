@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .particles import draw_particles, fit_squares, plane
-from .style import (
+from jaxsph.plotting.particles import draw_particles, fit_squares, plane
+from jaxsph.plotting.style import (
     INK,
     MAGNITUDE_MAP,
     SIGNED_MAP,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .style import BLUE, INK, SMALL, VERMILLION, dress, legend_below, save, sheet
+from jaxsph.plotting.style import BLUE, INK, SMALL, VERMILLION, dress, legend_below, save, sheet
 
 SHOWN = 60  # modes on the axis, or four times the last mark
 ROUND_OFF = 1e-16  # of the largest singular value: what lies below is noise

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 
+from jaxsph.plotting.style import shared_limits
 from jaxsph_rom.report import (
     Case,
     Profile,
@@ -22,7 +23,6 @@ from jaxsph_rom.report import (
     write_report,
 )
 from jaxsph_rom.report.figures.spectrum import missing_energy
-from jaxsph_rom.report.figures.style import shared_limits
 
 DENSITY, SOUND = 1000.0, 10.0  # kg/m^3, m/s
 WAVE = 2 * np.pi  # 1/m

@@ -33,6 +33,18 @@ def plane(name: str, position: np.ndarray) -> np.ndarray:
     return position
 
 
+def middle_layer(position: np.ndarray) -> np.ndarray:
+    """Which particles (N, n) [m] to draw in a plane: all of two dimensions, and of three those in a
+    layer one spacing thick in the middle of the third."""
+    if position.shape[1] == 2:
+        return np.ones(len(position), bool)
+    low, high = np.nanmin(position, axis=0), np.nanmax(position, axis=0)
+    thickness = float(np.prod(high - low) / len(position)) ** (1.0 / 3.0)
+    # off the middle by a quarter, so that of an odd and an even number of layers it holds one
+    above = position[:, 2] - 0.5 * (low[2] + high[2]) + 0.25 * thickness
+    return (above >= 0.0) & (above < thickness)
+
+
 def spacing(position: np.ndarray) -> float:
     """Typical distance of neighbouring particles (N, 2) [m]; 1 where it cannot be told.
 

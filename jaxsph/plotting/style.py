@@ -6,6 +6,7 @@ display and do not depend on the user's matplotlib settings for colours and lett
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -44,6 +45,13 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=RESOLUTION, facecolor="white", bbox_inches="tight", pad_inches=0.1)
     return path
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as PNG, for a page that holds it."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=RESOLUTION, facecolor="white")
+    return stream.getvalue()
 
 
 def dress(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> None:

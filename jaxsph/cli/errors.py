@@ -1,0 +1,35 @@
+"""What is wrong with a command's input, as one line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import NoReturn
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are `ValueError`s, for `report_errors` to print."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(f"{message} (see {self.prog} --help).")
+
+
+def report_errors(program: str, command, *arguments) -> int:
+    """Run a command; what is wrong with its input becomes one line on stderr and code 2.
+
+    A disk that fails in mid-run gives code 1.
+    """
+    try:
+        return command(*arguments)
+    except MemoryError:
+        return fail(program, "not enough memory; lower the resolution.", 2)
+    except ValueError as error:
+        return fail(program, str(error), 2)
+    except OSError as error:
+        return fail(program, f"{error}; choose another place.", 1)
+
+
+def fail(program: str, message: str, code: int) -> int:
+    """Print an error as one line on stderr; the exit code is handed back."""
+    print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
+    return code

@@ -1,0 +1,73 @@
+"""Options that commands share: their types, what their words stand for; rows as printed."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+from tqdm import tqdm
+
+from ..arrangements import JitteredLattice, Lattice, Packed, Stirred
+from ..integrate import AutomaticSteps, FixedSteps
+
+STEPPING = {"fixed": FixedSteps(), "automatic": AutomaticSteps()}
+ARRANGEMENTS = {
+    "packed": Packed,
+    "lattice": lambda seed: Lattice(),
+    "jittered": JitteredLattice,
+    "stirred": Stirred,
+}
+SCALES = ("small", "half", "paper")
+
+
+def positive_float(text: str) -> float:
+    """A finite number above zero."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
+    return value
+
+
+def positive_int(text: str) -> int:
+    """A whole number above zero."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    return value
+
+
+def whole_number(text: str) -> int:
+    """0, 1, 2, ..."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be at least 0, got {text}")
+    return value
+
+
+def seed(text: str) -> int:
+    """A seed of random numbers."""
+    value = int(text)
+    if not 0 <= value < 2**32:
+        raise argparse.ArgumentTypeError(f"must be from 0 to 2^32 - 1, got {text}")
+    return value
+
+
+def margin(text: str) -> float:
+    """A factor on allocated capacities."""
+    value = float(text)
+    if not 1.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    return value
+
+
+def progress_bar(total: int, unit: str, done: int = 0) -> tqdm:
+    """A bar on stderr with the estimated time left, seldom redrawn where that is a log file."""
+    interval = 0.1 if sys.stderr.isatty() else 10.0
+    return tqdm(total=total, initial=done, unit=unit, file=sys.stderr, mininterval=interval)
+
+
+def print_rows(rows: dict[str, str]) -> None:
+    """Names and values, aligned."""
+    for name, value in rows.items():
+        print(f"{name:22} {value}")

@@ -1,0 +1,150 @@
+"""A run on the command line: shown as it goes, recorded, and reported at its end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from ..environment import environment
+from ..history import energy_unit
+from ..integrate import Model, SimulationError
+from ..io import TrajectoryFileError, TrajectoryWriter
+from ..metrics import kinetic_energy
+from ..scenes import Scene
+from ..scenes import taylor_green_solution as taylor_green_exact
+from ..simulate import simulate
+from ..trajectory import Trajectory
+from .errors import fail
+from .options import STEPPING, print_rows, progress_bar
+
+REPORT = "report.html"  # its name, beside the trajectory
+
+
+def simulate_and_report(
+    options, scene: Scene, model: Model, writer: TrajectoryWriter, first_step: int
+) -> int:
+    """Run, record, and tell how it went; the exit code.
+
+    Args:
+        options: of the command.
+        scene: with the particles as they are at the first step.
+        model: made for the scene.
+        writer: of the trajectory file; it is closed at the end.
+        first_step: 0, or where a resumed run goes on.
+    """
+    metadata = {"scene": scene.name, "parameters": scene.parameters}
+    if first_step:
+        metadata["resumed_from_step"] = first_step
+    bar = progress_bar(scene.steps, "step", first_step)
+    try:
+        with writer, bar:
+            trajectory = simulate(
+                model,
+                scene.state,
+                time_step=scene.time_step,
+                steps=scene.steps,
+                steps_per_snapshot=scene.steps_per_snapshot,
+                first_step=first_step,
+                recorder=_Progress(writer, bar, scene),
+                progress=bar.update,
+                metadata=metadata,
+                stepping=STEPPING[options.steps],
+            )
+            writer.finish(trajectory.metadata)
+    except SimulationError as error:
+        _report(scene, writer, {"fault": str(error)})
+        return fail("jaxsph", f"{error} {_holds(writer)}", 1)
+    except TrajectoryFileError as error:  # the disk takes no more, so no report either
+        return fail("jaxsph", f"{error} {_holds(writer)}", 1)
+    except KeyboardInterrupt:
+        return fail("jaxsph", f"interrupted. {_holds(writer)} Go on with --resume.", 130)
+    results = _results(scene, trajectory, writer.path)
+    if options.json is not None:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
+    rows = _rows(results)
+    print_rows({**rows, "report": str(_report(scene, writer, rows))})
+    return 0
+
+
+def _report(scene: Scene, writer: TrajectoryWriter, rows: dict[str, str]) -> Path:
+    from ..report.run_report import write_run_report  # matplotlib takes its time to load
+
+    path, rows = writer.path.with_name(REPORT), {**rows, "trajectory": writer.path.name}
+    return write_run_report(path, writer.path, float(scene.mass), rows, environment())
+
+
+class _Progress:
+    """Hands snapshots on to a file and shows their kinetic energy beside a progress bar."""
+
+    def __init__(self, writer: TrajectoryWriter, bar: tqdm, scene: Scene):
+        self.writer, self.bar, self.mass = writer, bar, float(scene.mass)
+        self.unit = energy_unit(scene.space.box.dim)
+
+    def append(self, step, time, snapshot):
+        self.writer.append(step, time, snapshot)
+        energy = float(kinetic_energy(snapshot.velocity, self.mass))
+        self.bar.set_postfix_str(f"kinetic energy {energy:.4g} {self.unit}", refresh=False)
+
+
+def _holds(writer: TrajectoryWriter) -> str:
+    if writer.last_time is None:
+        return f"{writer.path} holds no snapshot."
+    return f"{writer.path} holds the snapshots up to t = {writer.last_time:.6g} s."
+
+
+def _results(scene: Scene, trajectory: Trajectory, path: Path) -> dict[str, Any]:
+    metadata = trajectory.metadata
+    work = trajectory.particles * metadata["steps"]
+    return {
+        "scene": scene.name,
+        "parameters": scene.parameters,
+        "dtype": str(trajectory.position.dtype),
+        "particles": trajectory.particles,
+        "steps": metadata["steps"],
+        "first_step": metadata.get("resumed_from_step", 0),
+        "end_time": float(trajectory.time[-1]),
+        "run_seconds": metadata["run_seconds"],
+        "compile_seconds": metadata["compile_seconds"],
+        "microseconds_per_particle_and_step": 1e6 * metadata["run_seconds"] / work,
+        "errors": _errors(scene, trajectory),
+        "trajectory": str(path),
+    }
+
+
+def _errors(scene: Scene, trajectory: Trajectory) -> dict[str, float] | None:
+    """Relative errors at the end, where the scene has an exact solution."""
+    if scene.name != "taylor-green":
+        return None
+    time, density = float(trajectory.time[-1]), float(scene.fluid.reference_density)
+    viscosity = 1.0 / scene.parameters["reynolds"]
+    velocity = np.asarray(trajectory.velocity[-1], np.float64)
+    exact = np.asarray(taylor_green_exact.velocity(trajectory.position[-1], time, viscosity))
+    energy = float(taylor_green_exact.kinetic_energy(time, viscosity, density))
+    found = float(kinetic_energy(velocity, float(scene.mass)))
+    return {
+        "velocity_relative_l2": float(np.linalg.norm(velocity - exact) / np.linalg.norm(exact)),
+        "kinetic_energy_relative": abs(found - energy) / energy,
+    }
+
+
+def _rows(results: dict[str, Any]) -> dict[str, str]:
+    """Results as they are shown to people."""
+    first = f"from step {results['first_step']} " if results["first_step"] else ""
+    rows = {
+        "particles": f"{results['particles']}",
+        "steps": f"{results['steps']}, {first}to t = {results['end_time']:g} s",
+        "run": f"{results['run_seconds']:.3g} s",
+        "compile": f"{results['compile_seconds']:.3g} s",
+        "per particle and step": f"{results['microseconds_per_particle_and_step']:.3g} us",
+    }
+    if results["errors"] is not None:
+        velocity, energy = results["errors"].values()
+        rows["velocity error"] = f"{100.0 * velocity:.3g} % (relative L2, at the end)"
+        rows["kinetic energy error"] = f"{100.0 * energy:.3g} % (at the end)"
+    rows["trajectory"] = results["trajectory"]
+    return rows

@@ -1,0 +1,156 @@
+"""`jaxsph run SCENE --resume FILE`: on with a run, from its last snapshot or an earlier one."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+
+from ..arrangements import Lattice
+from ..io import Checkpoint, TrajectoryWriter, check_target, read_checkpoint
+from ..particles import ParticleState
+from ..scenes import Scene
+from ..scenes.record import scene_from_record
+from .errors import Parser
+from .options import positive_float, whole_number
+from .recorded import REPORT, simulate_and_report
+
+_COSTLY = ("Packed", "Stirred")  # to make, and as many particles as the lattice
+_SAME_TIME = 0.01  # snapshot intervals by which a given time may be off that of a snapshot
+
+
+def add_resume_options(run: Parser) -> None:
+    """Add what says where a run goes on."""
+    run.add_argument(
+        "--resume", type=Path, metavar="FILE", help="go on with a run that was cut short"
+    )
+    start = run.add_mutually_exclusive_group()
+    start.add_argument(
+        "--from-step",
+        type=whole_number,
+        metavar="N",
+        help="with --resume and --out: go on from the snapshot of step N, in a new file",
+    )
+    start.add_argument(
+        "--from-time",
+        type=_time,
+        metavar="T",
+        help="the same, from the snapshot at time T [s]",
+    )
+
+
+def check_resume_options(options, scene_options: list[str]) -> None:
+    """A ValueError for options that do not go together.
+
+    Args:
+        options: of the command.
+        scene_options: given ones that a resumed run has from its file.
+    """
+    branch = _branches(options)
+    if options.resume is None:
+        if branch:
+            raise ValueError("--from-step, --from-time: name the file of the run by --resume.")
+        return
+    if branch and options.out is None:
+        raise ValueError(
+            "--from-step, --from-time: the run goes on in a new file; give its folder by --out."
+        )
+    given = list(scene_options)
+    given += ["--out"] if options.out is not None and not branch else []
+    given += ["--overwrite"] if options.overwrite else []
+    if given:
+        raise ValueError(
+            f"{', '.join(given)}: a resumed run has its settings from its file; leave them out."
+        )
+
+
+def resume(options) -> int:
+    """Go on with the run in a file, in that file or, from an earlier snapshot, in a new one."""
+    path = options.resume
+    checkpoint = read_checkpoint(path)
+    if checkpoint.scene != options.scene:
+        raise ValueError(
+            f"{path}: holds a run of scene {checkpoint.scene}, not of {options.scene}; "
+            f"name that scene or another file."
+        )
+    target = path
+    if _branches(options):
+        checkpoint = read_checkpoint(path, _wanted_step(options, checkpoint))
+        target = options.out / "trajectory.h5"
+        check_target(target, overwrite=False)
+        if checkpoint.step == checkpoint.steps:
+            raise ValueError(f"{path}: step {checkpoint.step} is its last; name an earlier one.")
+    elif _ended(path, checkpoint):
+        end = checkpoint.step * checkpoint.time_step
+        print(f"{path} is complete ({checkpoint.step} steps to t = {end:g} s): nothing to do.")
+        return 0
+    check_target(target.with_name(REPORT))
+    with jax.enable_x64(checkpoint.parameters.get("dtype") != "float32"):
+        scene = _restored(path, checkpoint)
+        # room for neighbours as at the run's own start, so that sums are rounded alike
+        start = scene.state if checkpoint.state is None else _arrays(read_checkpoint(path, 0).state)
+        model = scene.model(start, options.capacity_margin)
+        if _branches(options):
+            writer = TrajectoryWriter.branch(path, target, checkpoint.step)
+        else:
+            writer = TrajectoryWriter.append_to(path)
+        return simulate_and_report(options, scene, model, writer, max(0, checkpoint.step))
+
+
+def _time(text: str) -> float:
+    """A time [s], 0 or later."""
+    return 0.0 if float(text) == 0.0 else positive_float(text)
+
+
+def _branches(options) -> bool:
+    return options.from_step is not None or options.from_time is not None
+
+
+def _wanted_step(options, checkpoint: Checkpoint) -> int:
+    """The step whose snapshot is asked for."""
+    if options.from_step is not None:
+        return options.from_step
+    interval = checkpoint.steps_per_snapshot * checkpoint.time_step
+    number = round(options.from_time / interval)
+    if abs(options.from_time - number * interval) > _SAME_TIME * interval:
+        last = checkpoint.step * checkpoint.time_step
+        raise ValueError(
+            f"{options.resume}: holds no snapshot at t = {options.from_time:g} s; it has one every "
+            f"{interval:g} s from 0 to {last:g} s."
+        )
+    return number * checkpoint.steps_per_snapshot
+
+
+def _ended(path: Path, checkpoint: Checkpoint) -> bool:
+    """Whether there is nothing left to run; a file killed just before its last word gets it."""
+    if not checkpoint.complete and checkpoint.step == checkpoint.steps:
+        with TrajectoryWriter.append_to(path) as writer:
+            writer.finish()
+        return True
+    return checkpoint.complete
+
+
+def _restored(path: Path, checkpoint: Checkpoint) -> Scene:
+    """The scene of a file, its particles as they were stored."""
+    state = checkpoint.state
+    rule = checkpoint.parameters.get("arrangement", {}).get("rule")
+    spared = Lattice() if state is not None and rule in _COSTLY else None
+    scene = scene_from_record(checkpoint.scene, checkpoint.parameters, spared)
+    same = ("time_step", "steps", "steps_per_snapshot")
+    fits = all(getattr(scene, name) == getattr(checkpoint, name) for name in same)
+    if state is not None:
+        fits = fits and state.position.shape == scene.state.position.shape
+        scene = dataclasses.replace(scene, state=_arrays(state))
+    if not fits:
+        raise ValueError(
+            f"{path}: scene {checkpoint.scene} now has other steps or particles than when the file "
+            "was written; resume with the version of jaxsph that wrote it, or run it anew."
+        )
+    return scene
+
+
+def _arrays(state: ParticleState) -> ParticleState:
+    """On the device."""
+    return jax.tree.map(jnp.asarray, state)

@@ -1,0 +1,101 @@
+"""`jaxsph show FILE.h5`: a quick look at a run, whether it has ended or not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..history import energy_unit, read_history
+from ..io import Overview, check_target, read_overview, read_snapshot
+from ..metrics import kinetic_energy
+from ..report.settings import scene_rows
+from .options import print_rows
+
+_SAMPLES = 20  # snapshots that are read of a long run, beside the last one
+
+
+def add_to(commands) -> None:
+    """Add the command to a parser's commands."""
+    show = commands.add_parser(
+        "show",
+        help="a quick look at a run",
+        description="Tell what a trajectory file holds: the scene, how far the run has come, and "
+        "what its particles do. The file may still be written.",
+    )
+    show.set_defaults(command=_show)
+    add = show.add_argument
+    add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run")
+    add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
+    add("--json", type=Path, metavar="FILE", help="write what is shown to FILE as well")
+
+
+def _show(options) -> int:
+    for target in (options.figure, options.json):
+        if target is not None:
+            check_target(target)
+    overview = read_overview(options.file)
+    measures = _measures(options.file, overview)
+    print_rows({"file": f"{options.file}, {_size(overview.size)}", **_rows(overview, measures)})
+    if options.json is not None:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps({**vars(overview), **measures}, indent=2) + "\n")
+    if options.figure is not None:
+        from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
+
+        save(snapshot_figure(*read_snapshot(options.file)), options.figure)
+        print_rows({"figure": str(options.figure)})
+    return 0
+
+
+def _measures(path: Path, overview: Overview) -> dict[str, Any]:
+    """Energies, densities and speeds, JSON-like; of a long run, those of some snapshots."""
+    if not overview.snapshots:
+        return {}
+    every = max(1, overview.snapshots // _SAMPLES)
+    mass = overview.mass or float("nan")
+    history = read_history(path, overview.particles, mass, every)
+    _, last = read_snapshot(path, overview.snapshots - 1)
+    measures = {
+        "lowest_density": min(float(history.lowest_density.min()), float(last.density.min())),
+        "highest_density": max(float(history.highest_density.max()), float(last.density.max())),
+        "highest_speed": max(
+            float(history.highest_speed.max()), float((last.velocity**2).sum(axis=1).max() ** 0.5)
+        ),
+        "snapshots_read": len(history.time) + int((overview.snapshots - 1) % every > 0),
+    }
+    if overview.mass is not None:
+        measures["kinetic_energy_first"] = float(history.kinetic_energy[0])
+        measures["kinetic_energy_last"] = float(kinetic_energy(last.velocity, mass))
+    return measures
+
+
+def _rows(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
+    rows = scene_rows(overview)
+    done = f"{max(0, overview.step)} of {overview.steps} steps"
+    rows["progress"] = f"complete, {done}" if overview.complete else (
+        f"{done}; still being written, or cut short and to go on with --resume"
+    )  # fmt: skip
+    rows["time"] = f"{overview.snapshots} snapshots from 0 to {overview.time:g} s"
+    if measures:
+        some = f"over {measures['snapshots_read']} of {overview.snapshots} snapshots"
+        if "kinetic_energy_first" in measures:
+            first, last = (measures[f"kinetic_energy_{name}"] for name in ("first", "last"))
+            unit = energy_unit(overview.dim)
+            rows["kinetic energy"] = f"{first:.5g} {unit} at first, {last:.5g} {unit} at last"
+        low, high = measures["lowest_density"], measures["highest_density"]
+        rows["density"] = f"{low:.5g} to {high:.5g} kg/m^3 ({some})"
+        rows["largest speed"] = f"{measures['highest_speed']:.4g} m/s ({some})"
+    if "run_seconds" in overview.metadata:
+        rows["run"] = f"{overview.metadata['run_seconds']:.3g} s"
+    rows["versions"] = ", ".join(f"{name} {text}" for name, text in overview.versions.items())
+    return rows
+
+
+def _size(count: int) -> str:
+    """Bytes as people read them."""
+    value, units = float(count), ["B", "kB", "MB", "GB", "TB"]
+    while value >= 1000.0 and len(units) > 1:
+        value /= 1000.0
+        units.pop(0)
+    return f"{value:.3g} {units[0]}"

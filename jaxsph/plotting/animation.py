@@ -1,0 +1,167 @@
+"""A run as a moving picture, GIF or MP4."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+
+from ..io import check_target, snapshot_blocks
+from ..trajectory import Trajectory
+from .fields import VELOCITY, ParticleField
+from .particles import draw_particles, fit_squares, middle_layer, spacing
+from .snapshot import label_panel, panel_size
+from .style import INK, TEXT, sheet
+
+_DPI = 100
+_TAILS = (0.01, 0.99)  # quantiles of the whole run that the colours span; an impact may be out
+_LADDER = np.linspace(0.0, 1.0, 201)  # quantiles of a frame that stand for its values
+
+
+def animate(
+    source: str | os.PathLike,
+    path: str | os.PathLike,
+    field: ParticleField = VELOCITY,
+    every: int = 1,
+    frames_per_second: int = 15,
+    progress: Callable[[int], None] | None = None,
+) -> Path:
+    """Draw the particles of a trajectory file, coloured by a field, at all its times.
+
+    Axes span the whole run, colours all but one percent of its values at either end. The file is
+    read twice, one snapshot at a time. The frames of a GIF are held in memory until its end, about
+    a megabyte each; those of an MP4 are not.
+
+    Args:
+        source: the trajectory file.
+        path: of the picture, ending with `.gif` or `.mp4`; one that is there is replaced.
+        field: colours the particles.
+        every: show every N-th snapshot, from the first on.
+        frames_per_second: of the picture.
+        progress: is called with the number of frames drawn since its last call.
+
+    Raises:
+        ValueError: if the ending is another, `every` or the number of frames is below 1, or an MP4
+            is asked for where there is no ffmpeg.
+        TrajectoryFileError: if the source is not a whole trajectory file with a snapshot in it, or
+            the picture's folder does not serve.
+    """
+    path = Path(path)
+    if path.suffix not in _WRITERS:
+        raise ValueError(f"{path}: pictures end with {' or '.join(_WRITERS)}; name it so.")
+    if frames_per_second < 1:
+        raise ValueError(f"frames_per_second: {frames_per_second}; give at least 1.")
+    blocks = snapshot_blocks(source, 1, every)
+    check_target(path)
+    writer, settings = _WRITERS[path.suffix](frames_per_second)
+    view = _View.of(source, field, every)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        with matplotlib.rc_context(settings):
+            _draw(blocks, writer, part, field, view, progress)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, progress) -> None:
+    """All frames into a picture."""
+    first = next(blocks)
+    width, height = panel_size(np.stack([view.low, view.high]))
+    figure = sheet(width + 1.6, height + 0.9)
+    axes = figure.subplots()
+    color_map, limits = field.colours(*view.values)
+    squares = draw_particles(axes, *_shown(first, field), color_map, limits)
+    margin = 0.5 * spacing(np.asarray(squares.get_offsets()))
+    axes.set(
+        xlim=(view.low[0] - margin, view.high[0] + margin),
+        ylim=(view.low[1] - margin, view.high[1] + margin),
+    )
+    label_panel(figure, axes, squares, field.label, extend="both")
+    title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
+    fit_squares(figure, [(axes, squares)])
+    figure.set_layout_engine("none")  # nothing moves but the particles
+    with writer.saving(figure, str(path), _DPI):
+        block = first
+        while block is not None:
+            position, value = _shown(block, field)
+            squares.set_offsets(position)
+            squares.set_array(value)
+            title.set_text(view.title(block))
+            writer.grab_frame()
+            if progress is not None:
+                progress(1)
+            block = next(blocks, None)
+
+
+def _shown(block: Trajectory, field: ParticleField) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (P, 2) [m] and values (P,) of the particles drawn."""
+    shown = middle_layer(block.position[0])
+    return block.position[0][shown, :2], field.value(block)[0][shown]
+
+
+@dataclass(frozen=True)
+class _View:
+    """What a whole run spans: positions (2,) [m], values of a field, and the title of a frame."""
+
+    low: np.ndarray
+    high: np.ndarray
+    values: tuple[float, float]
+    scene: str
+    decimals: int
+
+    @classmethod
+    def of(cls, source, field: ParticleField, every: int) -> _View:
+        lows, highs, values, times = [], [], [], []
+        for block in snapshot_blocks(source, 1, every):
+            position, value = _shown(block, field)
+            lows.append(position.min(axis=0))
+            highs.append(position.max(axis=0))
+            values.append(np.quantile(value, _LADDER))
+            times.append(block.time[0])
+        interval = times[1] - times[0] if len(times) > 1 else 1.0
+        return cls(
+            np.min(lows, axis=0),
+            np.max(highs, axis=0),
+            tuple(np.quantile(values, _TAILS)),
+            str(block.metadata.get("scene", "")),
+            int(np.clip(1 - np.floor(np.log10(interval)), 0, 9)),
+        )
+
+    def title(self, block: Trajectory) -> str:
+        return f"{self.scene}, t = {block.time[0]:.{self.decimals}f} s"
+
+
+def _gif(frames_per_second: int) -> tuple[AbstractMovieWriter, dict[str, str]]:
+    return PillowWriter(fps=frames_per_second), {}
+
+
+def _mp4(frames_per_second: int) -> tuple[AbstractMovieWriter, dict[str, str]]:
+    return FFMpegWriter(fps=frames_per_second), {"animation.ffmpeg_path": _ffmpeg()}
+
+
+def _ffmpeg() -> str:
+    """The program, of the system or of the package that brings one."""
+    found = shutil.which("ffmpeg")
+    if found is not None:
+        return found
+    try:
+        import imageio_ffmpeg
+
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        raise ValueError(
+            "ffmpeg, which writes MP4, is not there; install it, or the extra jaxsph[movie], "
+            "or name a .gif."
+        ) from None
+
+
+_WRITERS = {".gif": _gif, ".mp4": _mp4}

@@ -1,0 +1,57 @@
+"""The page that a full run leaves: settings, errors and times, figures, versions and machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..history import energy_unit, read_history
+from ..io import read_overview, read_snapshot
+from ..plotting import history_figure, snapshot_figure
+from ..plotting.style import png
+from . import page
+from .settings import environment_rows, scene_rows
+
+
+def write_run_report(
+    path: str | os.PathLike,
+    trajectory: str | os.PathLike,
+    mass: float,
+    results: Mapping[str, str],
+    environment: Mapping[str, Mapping[str, Any]],
+) -> Path:
+    """Write the page of the run in a trajectory file, and return its path.
+
+    Args:
+        path: of the page.
+        trajectory: the file, whole or cut short; it is read some snapshots at a time.
+        mass: of a particle [kg].
+        results: errors, times or what went wrong, as they are shown to people.
+        environment: as `jaxsph.environment.environment` gives it.
+
+    Raises:
+        TrajectoryFileError: if the trajectory file cannot be read.
+    """
+    overview = read_overview(trajectory)
+    pieces = [page.heading("Errors and times"), page.rows(results)]
+    if overview.snapshots:
+        history = read_history(trajectory, overview.particles, mass)
+        time, snapshot = read_snapshot(trajectory)
+        layer = ", of the middle layer" if overview.dim == 3 else ""
+        pieces += [
+            page.heading("Figures"),
+            page.figure(
+                png(snapshot_figure(time, snapshot)),
+                f"Velocity norm and pressure at the last snapshot, t = {time:g} s{layer}.",
+            ),
+            page.figure(
+                png(history_figure(history, energy_unit(overview.dim))),
+                "Kinetic energy of all particles, and the lowest and the highest density of one, "
+                "over time.",
+            ),
+        ]
+    pieces += [page.heading("Scene and settings"), page.rows(scene_rows(overview))]
+    pieces += [page.heading("Versions and machine"), page.rows(environment_rows(environment))]
+    return page.write_page(path, f"jaxsph: {overview.scene}", pieces)

@@ -1,0 +1,145 @@
+"""`jaxsph show`, `export` and `animate`: what they print and write, and how they say no."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import jaxsph
+from jaxsph.cli import main
+from jaxsph.cli.animate import FIELDS
+from jaxsph.cli.show import _size
+from jaxsph.io import TrajectoryWriter, read_trajectory
+from jaxsph.plotting import FIELDS as DRAWN
+from jaxsph.trajectory import Snapshot
+from tests.runs import random_run
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def shown(capsys):
+    """What was printed, by name."""
+    return {line[:22].strip(): line[23:] for line in capsys.readouterr().out.splitlines()}
+
+
+def test_show(tmp_path, capsys):
+    run = read_trajectory(random_run("t.h5", finish=True))
+    assert main(["show", "t.h5", "--json", "new/t.json"]) == 0
+    rows = shown(capsys)
+    assert rows["file"].startswith("t.h5, ") and rows["scene"] == "taylor-green"
+    assert "PressureForce" in rows["effects"] and rows["reynolds"] == "100"
+    assert rows["particles"] == "256, in 2 dimensions, float64"
+    assert rows["progress"].startswith("complete, ") and rows["run"] == "1.5 s"
+    assert rows["time"] == f"5 snapshots from 0 to {run.time[-1]:g} s"
+    mass = 1000.0 / 256
+    first, last = (0.5 * mass * (run.velocity[k] ** 2).sum() for k in (0, -1))
+    assert rows["kinetic energy"] == f"{first:.5g} J/m at first, {last:.5g} J/m at last"
+    low, high = run.density.min(), run.density.max()
+    assert rows["density"] == f"{low:.5g} to {high:.5g} kg/m^3 (over 5 of 5 snapshots)"
+    speed = np.linalg.norm(run.velocity, axis=2).max()
+    assert rows["largest speed"] == f"{speed:.4g} m/s (over 5 of 5 snapshots)"
+    assert f"jaxsph {jaxsph.__version__}" in rows["versions"]
+    stored = json.loads((tmp_path / "new" / "t.json").read_text())
+    assert stored["kinetic_energy_last"] == pytest.approx(last) and stored["complete"]
+
+
+def test_show_of_a_run_that_goes_on(capsys):
+    scene = jaxsph.scenes.taylor_green(16, arrangement=jaxsph.arrangements.Lattice())
+    state = scene.state
+    with TrajectoryWriter.create("t.h5", scene) as writer:
+        assert main(["show", "t.h5"]) == 0
+        rows = shown(capsys)
+        assert rows["time"] == "0 snapshots from 0 to 0 s" and "density" not in rows
+        assert main(["show", "t.h5", "--figure", "f.png"]) == 2
+        assert "holds no snapshot yet" in capsys.readouterr().err
+        for k in range(48):
+            density = state.density + k
+            fields = (state.position, state.velocity, density, density)
+            writer.append(2 * k, 0.02 * k, Snapshot(*map(np.asarray, fields)))
+        assert main(["show", "t.h5", "--figure", "new/f.png"]) == 0
+    rows = shown(capsys)
+    assert rows["progress"].startswith("94 of 100 steps; still being written, or cut short")
+    highest = float(state.density.max()) + 47  # of the last one, which every second leaves out
+    assert rows["density"].endswith(f" to {highest:.5g} kg/m^3 (over 25 of 48 snapshots)")
+    with Image.open("new/f.png") as picture:
+        assert picture.format == "PNG"
+
+
+def test_show_compiles_nothing():
+    random_run("t.h5")
+    script = (
+        "import jax, sys; from jaxsph.cli import main\n"
+        "jax.monitoring.register_event_duration_secs_listener(\n"
+        "    lambda name, *a, **k: sys.exit(name) if 'compile' in name else None)\n"
+        "assert main(['show', 't.h5', '--figure', 'f.png']) == 0"
+    )
+    root = str(jaxsph.__path__[0]).rpartition("/")[0]
+    done = subprocess.run(
+        [sys.executable, "-c", script], env={"PYTHONPATH": root}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_sizes():
+    assert [_size(n) for n in (999, 70800, 1.5e9, 2e15)] == [
+        "999 B",
+        "70.8 kB",
+        "1.5 GB",
+        "2e+03 TB",
+    ]
+
+
+def test_export(tmp_path, capsys):
+    random_run("t.h5")
+    assert main(["export", "t.h5"]) == 0
+    captured = capsys.readouterr()
+    assert "5 of 5" in captured.out and "t.vtkhdf" in captured.out and "5/5" in captured.err
+    arguments = ["--fields", "pressure", "velocity", "--every", "2", "--out", "new/x.vtkhdf"]
+    assert main(["export", "t.h5", *arguments]) == 0
+    rows = shown(capsys)
+    assert rows["snapshots"] == "3 of 5" and rows["fields"] == "position, pressure, velocity"
+    assert sorted(p.name for p in tmp_path.rglob("*.*")) == ["t.h5", "t.vtkhdf", "x.vtkhdf"]
+
+
+def test_animate(tmp_path, capsys, monkeypatch):
+    random_run("t.h5")
+    assert tuple(DRAWN) == FIELDS
+    assert main(["animate", "t.h5", "--field", "density", "--every", "3", "--fps", "5"]) == 0
+    captured = capsys.readouterr()
+    assert "2 of 5 snapshots, 5 per second" in captured.out and "2/2" in captured.err
+    with Image.open("t.gif") as picture:
+        assert (picture.n_frames, picture.info["duration"]) == (2, 200)
+    monkeypatch.setattr("jaxsph.cli.animate.FRAMES", 2)  # every third of five then
+    assert main(["animate", "t.h5", "--out", "new/x.gif"]) == 0
+    assert shown(capsys)["frames"] == "2 of 5 snapshots, 15 per second"
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["show", "missing.h5"], "no such file"),
+        (["show", "text"], "not an HDF5 file"),
+        (["show", "t.h5", "--figure", "text/f.png"], "Not a directory"),
+        (["export", "t.h5", "--out", "t.h5"], "is the trajectory itself"),
+        (["export", "t.h5", "--fields", "speed"], "--fields: invalid choice: 'speed'"),
+        (["export", "t.h5", "--every", "0"], "--every: must be at least 1"),
+        (["export", "t.h5", "--out", "text/t.vtkhdf"], "Not a directory"),
+        (["animate", "t.h5", "--out", "t.avi"], "end with .gif or .mp4"),
+        (["animate", "t.h5", "--fps", "0"], "--fps: must be at least 1"),
+        (["animate", "t.h5", "--field", "colour"], "--field: invalid choice: 'colour'"),
+        (["animate", "missing.h5"], "no such file"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, capsys, arguments, message):
+    random_run("t.h5", count=2)
+    (tmp_path / "text").write_text("text")
+    assert main(arguments) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith("jaxsph: error: ") and message in error
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["t.h5", "text"]
