@@ -75,7 +75,7 @@ class Flow:
             model, state, jnp.zeros((), jnp.int32), step, steps, 1, checkpoints=checkpoints
         )
         velocity = model.observe(state).velocity
-        weight = 1.0 + jnp.sin(0.7 * jnp.arange(len(velocity)))
+        weight = 1.0 + jnp.sin(0.7 * jnp.arange(len(velocity), dtype=velocity.dtype))
         return jnp.sum(weight * jnp.sum(velocity**2, axis=1)), fault.code
 
 

@@ -1,4 +1,4 @@
-"""The command line: `jaxsph scenes`, `run`, `show`, `export` and `animate`."""
+"""The command line: `jaxsph scenes`, `run`, `sweep`, `show`, `export` and `animate`."""
 
 from .errors import Parser as Parser
 from .errors import fail as fail
@@ -10,4 +10,5 @@ from .options import margin as margin
 from .options import positive_float as positive_float
 from .options import positive_int as positive_int
 from .options import print_rows as print_rows
+from .options import reynolds_numbers as reynolds_numbers
 from .options import seed as seed

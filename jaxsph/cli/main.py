@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import __version__
-from . import animate, export, run, scenes, show
+from . import animate, export, run, scenes, show, sweep
 from .errors import Parser, report_errors
 
 
@@ -21,6 +21,6 @@ def _parser() -> Parser:
     parser = Parser("jaxsph", description="Differentiable smoothed-particle hydrodynamics.")
     parser.add_argument("--version", action="version", version=f"jaxsph {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for command in (scenes, run, show, export, animate):
+    for command in (scenes, run, sweep, show, export, animate):
         command.add_to(commands)
     return parser

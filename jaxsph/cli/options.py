@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 
+import numpy as np
 from tqdm import tqdm
 
 from ..arrangements import JitteredLattice, Lattice, Packed, Stirred
@@ -19,6 +20,7 @@ ARRANGEMENTS = {
     "stirred": Stirred,
 }
 SCALES = ("small", "half", "paper")
+MOST_NUMBERS = 100_000  # Reynolds numbers in a call
 
 
 def positive_float(text: str) -> float:
@@ -43,6 +45,28 @@ def whole_number(text: str) -> int:
     if value < 0:
         raise argparse.ArgumentTypeError(f"must be at least 0, got {text}")
     return value
+
+
+def reynolds_numbers(text: str) -> list[float]:
+    """A Reynolds number, or a range of them."""
+    if ":" not in text:
+        return [positive_float(text)]
+    try:
+        start, stop, count = text.split(":")
+        start, stop, count = positive_float(start), positive_float(stop), positive_int(count)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"give a number or START:STOP:COUNT, as 100:250:50, got {text}"
+        ) from None
+    if count < 2 or not start < stop:
+        raise argparse.ArgumentTypeError(
+            f"START:STOP:COUNT needs START below STOP and a COUNT of at least 2, got {text}"
+        )
+    if count > MOST_NUMBERS:
+        raise argparse.ArgumentTypeError(
+            f"at most {MOST_NUMBERS} Reynolds numbers a call, got {text}"
+        )
+    return np.linspace(start, stop, count).tolist()
 
 
 def seed(text: str) -> int:

@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import jax
 
 from ..io import TrajectoryWriter, check_target
 from ..scenes import SCENES
-from ..scenes.lid_driven_cavity import LIDS
-from .options import ARRANGEMENTS, SCALES, STEPPING, margin, positive_float, positive_int, seed
+from .options import STEPPING, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
-from .scenes import takes, unpacked
+from .scene_options import (
+    add_member_options,
+    add_scene_options,
+    check_scene,
+    given,
+    scene_settings,
+)
+from .scenes import unpacked
 
-# options that say what is run, and the scene's name for each; a resumed run has them from its file
-_SCENE_OPTIONS = {
-    "resolution": "resolution",
-    "reynolds": "reynolds",
-    "t_end": "end_time",
-    "scale": "scale",
-    "h_over_dx": "h_over_dx",
-    "time_step": "time_step",
-    "arrangement": "arrangement",
-    "seed": "arrangement",
-    "lid": "lid",
-    "precision": "dtype",
-}
 _STEPS_HELP = (
     "fixed: dt throughout; automatic: as long as sound, viscosity, tension and forces allow "
     "(default: fixed; give it again with --resume)"
@@ -48,21 +40,8 @@ def add_to(commands) -> None:
     )
     run.set_defaults(command=_run)
     add = run.add_argument
-    add("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
-    add("--resolution", type=positive_int, metavar="N", help="particles per longest side")
-    add("--reynolds", type=positive_float, metavar="RE", help="Reynolds number")
-    add("--t-end", type=positive_float, metavar="T", help="end time [s]")
-    add("--scale", choices=SCALES, help="size of the run (default: small)")
-    add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
-    add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
-    add(
-        "--arrangement",
-        choices=tuple(ARRANGEMENTS),
-        help="how particles start (default: the scene's)",
-    )
-    add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
-    add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
-    add("--precision", choices=("float32", "float64"), help="default: float64")
+    add_scene_options(add)
+    add_member_options(add)
     add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder of the results (default: out/SCENE)")
@@ -72,14 +51,10 @@ def add_to(commands) -> None:
 
 
 def _run(options) -> int:
-    if options.scene not in SCENES:
-        raise ValueError(
-            f"scene: {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
-        )
+    check_scene(options)
     if options.json is not None:
         check_target(options.json)
-    given = [name for name in _SCENE_OPTIONS if getattr(options, name) is not None]
-    check_resume_options(options, [_flag(name) for name in given])
+    check_resume_options(options, given(options))
     if options.resume is not None:
         return resume(options)
     path = (Path("out", options.scene) if options.out is None else options.out) / "trajectory.h5"
@@ -88,29 +63,9 @@ def _run(options) -> int:
     precision = options.precision or "float64"
     with jax.enable_x64(precision == "float64"):
         make = SCENES[options.scene]
-        settings = _settings(options, make, precision)
+        settings = scene_settings(options, make, precision)
         make(**{**settings, **unpacked(make)})  # meets all bad input before the packing
         scene = make(**settings)
         model = scene.model(margin=options.capacity_margin)
         writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite)
         return simulate_and_report(options, scene, model, writer, 0)
-
-
-def _settings(options, make, precision: str) -> dict[str, Any]:
-    """What is given on the command line, in the scene's own words."""
-    settings = {}
-    for option, name in _SCENE_OPTIONS.items():
-        value = getattr(options, option)
-        if value is None:
-            continue
-        if name not in takes(make):
-            raise ValueError(f"{_flag(option)}: scene {options.scene} has no such setting.")
-        settings[name] = value
-    if "arrangement" in settings:
-        rule = ARRANGEMENTS[options.arrangement or "packed"]
-        settings["arrangement"] = rule(seed=options.seed or 0)
-    return {**settings, "dtype": precision} if "dtype" in takes(make) else settings
-
-
-def _flag(option: str) -> str:
-    return "--" + option.replace("_", "-")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph.cli import fail, positive_float, positive_int, print_rows, seed
+from jaxsph.cli import fail, positive_float, positive_int, print_rows, reynolds_numbers, seed
+from jaxsph.cli.options import MOST_NUMBERS
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
 from jaxsph.io import check_target
@@ -22,7 +22,6 @@ from ..report.plain import plain
 from .options import bar, distinct
 from .train import print_errors
 
-_MOST = 100_000  # Reynolds numbers in a call
 _MOST_FILES = 100  # with fields or tracers
 _MOST_BYTES = 4 * 2**30  # of all coordinates
 _FAULTS_SHOWN = 5
@@ -52,26 +51,6 @@ def add_to(commands) -> None:
     add("--seed", type=seed, default=0, metavar="N", help="of the draw (default: 0)")
     add("--out", type=Path, metavar="DIR", help="folder for results (default: out/predict-MODEL)")
     add("--json", type=Path, metavar="FILE", help="write what the table says to FILE as well")
-
-
-def reynolds_numbers(text: str) -> list[float]:
-    """A Reynolds number, or a range of them."""
-    if ":" not in text:
-        return [positive_float(text)]
-    try:
-        start, stop, count = text.split(":")
-        start, stop, count = positive_float(start), positive_float(stop), positive_int(count)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"give a number or START:STOP:COUNT, as 100:250:50, got {text}"
-        ) from None
-    if count < 2 or not start < stop:
-        raise argparse.ArgumentTypeError(
-            f"START:STOP:COUNT needs START below STOP and a COUNT of at least 2, got {text}"
-        )
-    if count > _MOST:
-        raise argparse.ArgumentTypeError(f"at most {_MOST} Reynolds numbers a call, got {text}")
-    return np.linspace(start, stop, count).tolist()
 
 
 def _predict(options) -> int:
@@ -105,8 +84,8 @@ def _predict(options) -> int:
 def _check(options, trained: TrainedFlow, reynolds: np.ndarray, snapshots: int) -> None:
     """A ValueError for what asks too much."""
     count = len(reynolds)
-    if count > _MOST:
-        raise ValueError(f"--reynolds: {count} of them; give at most {_MOST} a call.")
+    if count > MOST_NUMBERS:
+        raise ValueError(f"--reynolds: {count} of them; give at most {MOST_NUMBERS} a call.")
     size = count * (snapshots + 1) * trained.starts[0].nbytes
     if size > _MOST_BYTES:
         raise ValueError(

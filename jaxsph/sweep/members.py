@@ -1,0 +1,91 @@
+"""Members of a sweep as one pytree with a leading axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from ..full_model import FullModel
+from ..neighbors import NeighborSearch, WalledSearch
+from ..particles import ParticleState
+from ..scenes import Scene
+
+_SAME = ("name", "space", "time_step", "steps", "steps_per_snapshot")
+
+
+class Members(eqx.Module):
+    """Full models and their states, stacked: every array has a leading axis of members.
+
+    Args:
+        arrays: of all members, (K, ...), on the host.
+        structure: what they share: effects, kernel, capacities.
+    """
+
+    arrays: Any
+    structure: Any = eqx.field(static=True)
+
+    def select(self, numbers: Sequence[int]) -> Any:
+        """The arrays of some members."""
+        return jax.tree.map(lambda a: a[np.asarray(numbers)], self.arrays)
+
+    def one(self, arrays: Any) -> tuple[FullModel, ParticleState]:
+        """Model and state of a member from its arrays, within jit."""
+        return eqx.combine(arrays, self.structure)
+
+    def enlarged(self) -> Members:
+        """The same members with more room for neighbours."""
+        model, state = self.structure
+        return Members(self.arrays, (model.enlarged(), state))
+
+
+def stacked(scenes: Sequence[Scene]) -> Members:
+    """The full models of scenes that differ in what is in their arrays alone.
+
+    Raises:
+        ValueError: if there is none, or if they differ in more.
+    """
+    if not scenes:
+        raise ValueError("scenes: a sweep needs at least one.")
+    for name in _SAME:
+        for k, scene in enumerate(scenes):
+            if getattr(scene, name) != getattr(scenes[0], name):
+                raise ValueError(
+                    f"scenes: number {k} differs from the first in {name.replace('_', ' ')}; a "
+                    "sweep is over coefficients and starts: make all with the same size and steps."
+                )
+    models = [scene.model() for scene in scenes]
+    search = _roomiest([model.search for model in models])
+    members = [
+        eqx.partition((replace(model, search=search), scene.state), eqx.is_array)
+        for model, scene in zip(models, scenes, strict=True)
+    ]
+    first, structure = members[0]
+    for k, (arrays, static) in enumerate(members):
+        if jax.tree.structure((arrays, static)) != jax.tree.structure((first, structure)) or any(
+            a.shape != b.shape or a.dtype != b.dtype
+            for a, b in zip(jax.tree.leaves(arrays), jax.tree.leaves(first), strict=True)
+        ):
+            raise ValueError(
+                f"scenes: number {k} has other effects, walls or particles than the first; make "
+                "all with the same ones."
+            )
+    arrays = jax.tree.map(lambda *a: np.stack([np.asarray(x) for x in a]), *[m for m, _ in members])
+    return Members(arrays, structure)
+
+
+def _roomiest(searches: Sequence[NeighborSearch | WalledSearch]) -> NeighborSearch | WalledSearch:
+    """A search with the largest capacities of all."""
+    first = searches[0]
+    found = {}
+    for field in fields(first):
+        values = [getattr(search, field.name) for search in searches]
+        if isinstance(values[0], int):
+            found[field.name] = max(values)
+        elif isinstance(values[0], NeighborSearch):
+            found[field.name] = _roomiest(values)
+    return replace(first, **found)
