@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -14,6 +15,7 @@ import pytest
 import jaxsph
 
 ROOT = Path(__file__).parents[1]
+FOLDERS = ("jaxsph", "jaxsph_rom", "benchmarks", "docs", "notebooks", "tests", ".ci")
 MAIN_JOB = (
     "run taylor-green --resolution 16 --t-end 0.06 --arrangement lattice "
     "--train 100 200 --predict 150 --modes 2 --out out"
@@ -36,9 +38,14 @@ def run(*command, cwd, **variables) -> str:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """The wheel, made from the source distribution, and that itself."""
-    folder = tmp_path_factory.mktemp("dist")
-    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT, cwd=folder)
+    """The wheel, made from the source distribution, and that itself; built from a copy."""
+    folder, copy = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("copy")
+    for path in ROOT.iterdir():
+        if path.name in FOLDERS:
+            shutil.copytree(path, copy / path.name, ignore=shutil.ignore_patterns("__pycache__"))
+        elif path.is_file():
+            shutil.copy(path, copy)
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, copy, cwd=folder)
     (wheel,), (source,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
     return wheel, source
 

@@ -1,28 +1,41 @@
-"""A line `@help jaxsph run` is replaced by what `jaxsph run --help` prints."""
+"""A line `@help jaxsph` is replaced by what each command of that program says of itself."""
 
-import contextlib
+import argparse
 import importlib
-import io
 import os
 import re
 from unittest import mock
 
-_DIRECTIVE = re.compile(r"^@help (?P<line>jaxsph.*)$", re.MULTILINE)
-_MAIN = {"jaxsph": "jaxsph.cli", "jaxsph-rom": "jaxsph_rom.cli"}
+_DIRECTIVE = re.compile(r"^@help (?P<program>jaxsph(?:-rom)?)$", re.MULTILINE)
 
 
-def printed(line: str) -> str:
-    """The help of a command."""
-    program, *rest = line.split()
-    main = importlib.import_module(_MAIN[program]).main
-    with (
-        contextlib.redirect_stdout(io.StringIO()) as out,
-        contextlib.suppress(SystemExit),
-        mock.patch.dict(os.environ, {"COLUMNS": "88", "NO_COLOR": "1"}),
-    ):
-        main([*rest, "--help"])
-    return out.getvalue()
+class _Made(BaseException):
+    """Takes the parser out of the program that has made it."""
+
+
+def _parser(program: str) -> argparse.ArgumentParser:
+    def parse_args(self, *_):
+        raise _Made(self)
+
+    main = importlib.import_module(program.replace("-", "_") + ".cli").main
+    with mock.patch.object(argparse.ArgumentParser, "parse_args", parse_args):
+        try:
+            main([])
+        except _Made as made:
+            return made.args[0]
+    raise RuntimeError(f"{program}: does not parse its arguments by argparse.")
+
+
+def sections(program: str) -> str:
+    """A heading and the help of each command."""
+    actions = _parser(program)._actions
+    (commands,) = (a.choices for a in actions if isinstance(a, argparse._SubParsersAction))
+    with mock.patch.dict(os.environ, {"COLUMNS": "80", "NO_COLOR": "1"}):
+        texts = {name: parser.format_help() for name, parser in commands.items()}
+    return "\n".join(
+        f"### {program} {name}\n\n```text\n{text}```\n" for name, text in texts.items()
+    )
 
 
 def on_page_markdown(markdown, page, config, files):
-    return _DIRECTIVE.sub(lambda m: f"```text\n{printed(m['line'])}```", markdown)
+    return _DIRECTIVE.sub(lambda found: sections(found["program"]), markdown)

@@ -94,5 +94,15 @@ def test_figures_and_numbers_come_from_the_readme(site):
     assert figures and all(f'src="{figure}"' in page for figure in figures)
 
 
+def test_a_section_that_is_gone_breaks_the_build(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs/hooks")
+    section = importlib.import_module("include").section
+    text = "# Title\nstart\n## One\nfirst\n### Inside\n## Two\nsecond\n"
+    assert section(text, "(start)") == "start\n"
+    assert section(text, "One") == "first\n## Inside\n"
+    with pytest.raises(KeyError):
+        section(text, "Three")
+
+
 def test_the_readme_says_how_it_is_built():
     assert "python -m mkdocs build --strict" in (ROOT / "README.md").read_text()
