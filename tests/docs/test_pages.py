@@ -78,18 +78,18 @@ def test_a_shown_command_has_only_options_that_there_are(
             runpy.run_module(words[2], run_name="__main__", alter_sys=True)
 
 
-WITH_COMMANDS = [page for page in PAGES if commands(page)]
-
-
-@pytest.mark.parametrize("page", WITH_COMMANDS, ids=lambda page: page.stem)
-def test_the_commands_of_a_page_run_one_after_the_other(page, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for command in commands(page):
-        words = shlex.split(command)
-        if words[0] not in MAIN:
-            continue  # benchmarks are long; their options are checked above
-        smaller = "" if "--resume" in words else SMALLER.get(tuple(words[:2]), "")
-        assert MAIN[words[0]]([*words[1:], *smaller.split()]) == 0, command
+def test_the_commands_of_each_page_run_one_after_the_other(tmp_path, monkeypatch):
+    """One test for all pages, so that models alike are compiled once."""
+    for page in PAGES:
+        folder = tmp_path / page.relative_to(ROOT).with_suffix("")
+        folder.mkdir(parents=True)
+        monkeypatch.chdir(folder)
+        for command in commands(page):
+            words = shlex.split(command)
+            if words[0] not in MAIN:
+                continue  # benchmarks are long; their options are checked above
+            smaller = "" if "--resume" in words else SMALLER.get(tuple(words[:2]), "")
+            assert MAIN[words[0]]([*words[1:], *smaller.split()]) == 0, f"{page.name}: {command}"
 
 
 @pytest.mark.parametrize("page", PAGES[1:], ids=lambda page: page.stem)
