@@ -22,9 +22,17 @@ def relative_discrepancy(
 ) -> Float[np.ndarray, " times"]:
     """Percent relative discrepancy at each time (paper, eq. PRD):
 
-    100 mean_i |c_i - c~_i| / (max_i c_i - min_i c_i),
+        100 mean_i |c_i - c~_i| / (max_i c_i - min_i c_i),
 
-    0 where both are the same constant, as at the start from rest.
+    c_i the reference and c~_i the values at probe i; 0 where both are the same constant, as at the
+    start from rest.
+
+    Examples:
+        >>> import numpy as np
+        >>> from jaxsph.metrics import relative_discrepancy
+        >>> reference = np.array([[0.0, 1.0, 2.0]])  # one time, three probes
+        >>> relative_discrepancy(reference, reference + 0.02).round(3)
+        array([1.])
     """
     reference, values = np.asarray(reference), np.asarray(values)
     spread = reference.max(axis=1) - reference.min(axis=1)

@@ -72,6 +72,16 @@ def simulate(
     Raises:
         ValueError: if the steps are not whole snapshot intervals.
         SimulationError: on a fault; all good snapshots have gone to the recorder by then.
+
+    Examples:
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> scene = jaxsph.scenes.taylor_green(resolution=16, arrangement=Lattice())
+        >>> trajectory = jaxsph.simulate(
+        ...     scene.model(), scene.state, time_step=scene.time_step, steps=4, steps_per_snapshot=2
+        ... )
+        >>> trajectory.velocity.shape  # snapshots, particles, directions
+        (3, 256, 2)
     """
     if (steps - first_step) % steps_per_snapshot or steps <= first_step:
         raise ValueError(
@@ -162,7 +172,25 @@ def _lost(snapshot: Snapshot) -> int | None:
 
 
 def run_scene(scene, **options) -> Trajectory:
-    """`simulate` the full model of a scene by the scene's own steps."""
+    """`simulate` the full model of a scene by the scene's own steps.
+
+    Args:
+        scene: to run.
+        options: of `simulate`: `recorder`, `progress`, `stepping`.
+
+    Raises:
+        SimulationError: as `simulate`.
+
+    Examples:
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph.metrics import kinetic_energy
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> trajectory = jaxsph.run_scene(scene)
+        >>> energy = kinetic_energy(trajectory.velocity, float(scene.mass))
+        >>> bool(energy[-1] < energy[0])  # viscosity takes it
+        True
+    """
     return simulate(
         scene.model(),
         scene.state,

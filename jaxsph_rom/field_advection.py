@@ -42,10 +42,10 @@ def wall_momentum_flux(pair, i, j):
 class FieldAdvection(Effect):
     """Minus the advection of fields by the flow (paper, eqs. continuity and momentum advection):
 
-    grad rho_i . u_i = sum_j (rho_j u_j + rho_i u_i).grad W V_j
-                       - rho_i sum_j (u_j - u_i).grad W V_j,
-    grad u_i . u_i   = sum_j (u_j (x) u_j + u_i (x) u_i).grad W V_j
-                       - u_i sum_j (u_j - u_i).grad W V_j.
+        grad rho_i . u_i = sum_j (rho_j u_j + rho_i u_i).grad W V_j
+                           - rho_i sum_j (u_j - u_i).grad W V_j,
+        grad u_i . u_i   = sum_j (u_j (x) u_j + u_i (x) u_i).grad W V_j
+                           - u_i sum_j (u_j - u_i).grad W V_j.
 
     At a wall the velocity that carries is the particle's own with its normal part reversed, as in
     the continuity equation; the velocity that is carried is the ghost's.

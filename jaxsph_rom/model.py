@@ -50,6 +50,27 @@ class ReducedModel(Model):
         interpolation: of `basis.functions`, ordered (field, function).
         basis: the modes at the reference points, with centre and inner product.
         search: neighbour search.
+
+    Examples:
+        >>> import numpy as np
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph_rom import Energy, Galerkin, LocalSplines, ReducedModel, ReferenceSpace, pod
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> full = jaxsph.run_scene(scene)
+        >>> reference = ReferenceSpace(scene.state.position, scene.space)
+        >>> basis = pod(reference.snapshots(full), Energy(), scene.fluid, modes=2)
+        >>> functions = basis.functions.reshape(256, -1)  # on the points, ordered (field, mode)
+        >>> splines = LocalSplines.fit(np.asarray(reference.points), functions, scene.space)
+        >>> model = ReducedModel.of_scene(scene, basis, splines, Galerkin())
+        >>> reduced = jaxsph.simulate(
+        ...     model, model.project(scene.state), time_step=scene.time_step,
+        ...     steps=scene.steps, steps_per_snapshot=scene.steps_per_snapshot,
+        ... )
+        >>> reduced.coordinates.shape  # snapshots, modes
+        (4, 2)
+        >>> bool(np.abs(reduced.velocity[-1] - full.velocity[-1]).max() < 0.05)  # of 1 m/s
+        True
     """
 
     functional: SPHFunctional

@@ -25,6 +25,16 @@ class ReferenceSpace(eqx.Module):
         space: box, kernel, smoothing length of the full model.
         rule: of G: `ShepardMap` (the paper's), or `MovingLeastSquaresMap`, which keeps linear
             fields.
+
+    Examples:
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph_rom import ReferenceSpace
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> trajectory = jaxsph.run_scene(scene)
+        >>> reference = ReferenceSpace(scene.state.position, scene.space)
+        >>> reference.snapshots(trajectory).shape  # points, fields (density and velocity), times
+        (256, 3, 4)
     """
 
     points: Float[Array, "points dim"]

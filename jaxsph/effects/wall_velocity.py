@@ -20,11 +20,13 @@ def _near_velocity(sums, space):
 
 
 class NoSlip(Effect):
-    """u_i = 2 u_w - <u>_i at ghost i (Adami et al. 2012, eq. 23), u_w the wall's velocity:
+    """The fluid's velocity, extrapolated through the wall's own at the surface, for ghost i:
 
-    the fluid's velocity, extrapolated through the wall's own at the surface. The paper reverses the
-    tangential part only; the normal part plays no role in a viscous sum beside a wall that keeps it
-    near zero.
+        u_i = 2 u_w - <u>_i,    <u>_i = sum_j u_j W_ij / sum_j W_ij
+
+    (Adami et al. 2012, eq. 23), u_w the wall's velocity, j the fluid particles. The paper reverses
+    the tangential part only; the normal part plays no role in a viscous sum beside a wall that
+    keeps it near zero.
     """
 
     def ghost_terms(self, space):
@@ -47,7 +49,12 @@ class FixedWallVelocity(Effect):
 
 
 class FreeSlip(Effect):
-    """u_i = <u>_i - 2 (<u>_i . n) n at ghost i: the mirror image of the fluid's velocity."""
+    """The mirror image of the fluid's velocity, for ghost i:
+
+        u_i = <u>_i - 2 (<u>_i . n) n,
+
+    n the wall's normal, and the mean over the fluid particles as in `NoSlip`.
+    """
 
     def ghost_terms(self, space):
         return (GHOST_WEIGHT, PairTerm("ghost_velocity", ("velocity",), ghost_velocity))

@@ -34,12 +34,19 @@ _METADATA_SPACE = 16384  # bytes; the attribute keeps the size it has at the sta
 class TrajectoryWriter:
     """A trajectory file being written: a `Recorder` for `simulate`, and a context manager.
 
-        with TrajectoryWriter.create(path, scene) as writer:
-            trajectory = run_scene(scene, recorder=writer)
-            writer.finish(trajectory.metadata)
-
     Make one by `create`, `append_to` or `branch`. `last_step` is the last step stored, -1 if there
     is none.
+
+    Examples:
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph.io import TrajectoryWriter, read_trajectory
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> with TrajectoryWriter.create("trajectory.h5", scene) as writer:
+        ...     trajectory = jaxsph.run_scene(scene, recorder=writer)
+        ...     writer.finish(trajectory.metadata)
+        >>> read_trajectory("trajectory.h5").particles
+        256
     """
 
     def __init__(self, path: Path, file: h5py.File):

@@ -15,10 +15,9 @@ class Kernel(ABC):
     A kernel is structure, not data: it has no array leaves, is hashed and compared by value, and
     belongs in a static field.
 
-    **Attributes:**
-
-    - `support`: support radius over smoothing length.
-    - `normalisation`: a_n for each dimension n it is defined in, such that W integrates to one.
+    Attributes:
+        support: support radius over smoothing length.
+        normalisation: a_n for each dimension n it is defined in, such that W integrates to one.
     """
 
     support: ClassVar[float]
@@ -26,26 +25,30 @@ class Kernel(ABC):
 
     @abstractmethod
     def value(self, r: Float[Array, "*pairs"], h: float, dim: int) -> Float[Array, "*pairs"]:
-        """W(r, h), in m^-dim.
+        """W(r, h) [1/m^dim].
 
-        **Arguments:**
-
-        - `r`: distances, at least zero, in m.
-        - `h`: smoothing length, in m.
-        - `dim`: dimension of space.
+        Args:
+            r: distances [m], at least zero.
+            h: smoothing length [m].
+            dim: dimension of space.
         """
 
     @abstractmethod
     def gradient_over_r(
         self, r: Float[Array, "*pairs"], h: float, dim: int
     ) -> Float[Array, "*pairs"]:
-        """(dW/dr) / r, in m^-(dim + 2), finite at r = 0: grad W = gradient_over_r * (x_i - x_j).
+        """(dW/dr) / r [1/m^(dim + 2)], finite at r = 0: grad W = gradient_over_r (x_i - x_j).
 
-        **Arguments:** as for `value`.
+        Args:
+            r, h, dim: as for `value`.
         """
 
     def scale(self, h: float, dim: int) -> float:
-        """a_n / h^n, in m^-dim. Raises a `ValueError` where the kernel has no such dimension."""
+        """a_n / h^n [1/m^dim].
+
+        Raises:
+            ValueError: where the kernel has no such dimension.
+        """
         if dim not in self.normalisation:
             raise ValueError(
                 f"dim: {type(self).__name__} is defined in dimensions "

@@ -13,7 +13,9 @@ def couette(
 ) -> Float[np.ndarray, " points"]:
     """u(y, t) [m/s] between a plate at rest at y = 0 and one at y = H = 1 m that slides with 1 m/s:
 
-    u = y + sum_n 2 (-1)^n / (n pi) sin(n pi y) exp(-nu n^2 pi^2 t).
+        u = y + sum_n 2 (-1)^n / (n pi) sin(n pi y) exp(-nu n^2 pi^2 t),
+
+    the sum up to n = 400.
     """
     n = np.arange(1, _TERMS + 1)[:, None]
     y = np.asarray(height)[None, :]
@@ -26,8 +28,10 @@ def poiseuille(
 ) -> Float[np.ndarray, " points"]:
     """u(y, t) [m/s] between plates at rest at y = 0 and H = 1 m under a force b [m/s^2]:
 
-    u = b y (1 - y) / (2 nu)
-        - sum_{n odd} 4 b / (nu (n pi)^3) sin(n pi y) exp(-nu n^2 pi^2 t).
+        u = b y (1 - y) / (2 nu)
+            - sum_{n odd} 4 b / (nu (n pi)^3) sin(n pi y) exp(-nu n^2 pi^2 t),
+
+    the sum up to n = 400.
     """
     n = np.arange(1, _TERMS + 1, 2)[:, None]
     y = np.asarray(height)[None, :]

@@ -14,15 +14,14 @@ WAVENUMBER = 2.0 * pi
 def velocity(
     position: Float[Array, "*points 2"], time: ScalarLike, viscosity: ScalarLike
 ) -> Float[Array, "*points 2"]:
-    """Velocity of the decaying two-dimensional vortex, in m/s.
+    """Velocity of the decaying two-dimensional vortex [m/s]:
 
         u = (sin kx cos ky, -cos kx sin ky) exp(-2 nu k^2 t)
 
-    **Arguments:**
-
-    - `position`: in m.
-    - `time`: in s.
-    - `viscosity`: kinematic, in m^2/s.
+    Args:
+        position: [m].
+        time: [s].
+        viscosity: kinematic [m^2/s].
     """
     x, y = _phases(position, dim=2)
     u = jnp.stack([jnp.sin(x) * jnp.cos(y), -jnp.cos(x) * jnp.sin(y)], axis=-1)
@@ -35,14 +34,16 @@ def pressure(
     viscosity: ScalarLike,
     density: ScalarLike,
 ) -> Float[Array, "*points"]:
-    """Pressure of the decaying two-dimensional vortex, with zero mean, in Pa.
+    """Pressure of the decaying two-dimensional vortex, with zero mean [Pa]:
 
         p = rho/4 (cos 2kx + cos 2ky) exp(-4 nu k^2 t)
 
     Rodriguez et al. (arXiv:2507.07830) print it with the opposite sign, which with this velocity
     does not satisfy the momentum equation.
 
-    **Arguments:** as for `velocity`, and `density` in kg/m^3.
+    Args:
+        position, time, viscosity: as for `velocity`.
+        density: [kg/m^3].
     """
     x, y = _phases(position, dim=2)
     p = jnp.cos(2.0 * x) + jnp.cos(2.0 * y)
@@ -52,21 +53,23 @@ def pressure(
 def kinetic_energy(
     time: ScalarLike, viscosity: ScalarLike, density: ScalarLike
 ) -> Float[Array, ""]:
-    """Kinetic energy of the two-dimensional vortex in the unit square, in J per m of depth.
+    """Kinetic energy of the two-dimensional vortex in the unit square [J per m of depth]:
 
         E = 1/2 rho int |u|^2 = rho/4 exp(-4 nu k^2 t)
 
-    **Arguments:** as for `pressure`.
+    Args:
+        time, viscosity, density: as for `pressure`.
     """
     return 0.25 * density * _decay(time, viscosity) ** 2
 
 
 def initial_velocity_3d(position: Float[Array, "*points 3"]) -> Float[Array, "*points 3"]:
-    """Initial velocity of the three-dimensional vortex, in m/s.
+    """Initial velocity of the three-dimensional vortex [m/s]:
 
         u = (sin kx cos ky cos kz, -cos kx sin ky cos kz, 0)
 
-    **Arguments:** `position` in m.
+    Args:
+        position: [m].
     """
     x, y, z = _phases(position, dim=3)
     u = jnp.sin(x) * jnp.cos(y) * jnp.cos(z)
@@ -77,11 +80,13 @@ def initial_velocity_3d(position: Float[Array, "*points 3"]) -> Float[Array, "*p
 def initial_pressure_3d(
     position: Float[Array, "*points 3"], density: ScalarLike
 ) -> Float[Array, "*points"]:
-    """Initial pressure of the three-dimensional vortex, with zero mean, in Pa.
+    """Initial pressure of the three-dimensional vortex, with zero mean [Pa]:
 
         p = rho/16 (cos 2kx + cos 2ky) (cos 2kz + 2)
 
-    **Arguments:** `position` in m, `density` in kg/m^3.
+    Args:
+        position: [m].
+        density: [kg/m^3].
     """
     x, y, z = _phases(position, dim=3)
     p = (jnp.cos(2.0 * x) + jnp.cos(2.0 * y)) * (jnp.cos(2.0 * z) + 2.0)

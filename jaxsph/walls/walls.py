@@ -74,6 +74,17 @@ class Walls(eqx.Module):
         Raises:
             ValueError: for a gap in the walls, a wall too thin, or a moving part without a wall or
                 that does not move along it.
+
+        Examples:
+            >>> import jax.numpy as jnp
+            >>> from jaxsph import Box, SignedDistance, Space, Walls
+            >>> from jaxsph.kernels import WendlandC2
+            >>> box = Box((0.0, 0.0), (2.0, 2.0), (False, False))
+            >>> space = Space(box, WendlandC2(), smoothing_length=0.2, spacing=0.1)
+            >>> disc = SignedDistance(lambda x: jnp.linalg.norm(x - 1.0, axis=1) - 1.0)
+            >>> walls = Walls.around(disc, space)
+            >>> bool((disc.signed_distance(walls.position) >= 0.0).all())  # ghosts are outside
+            True
         """
         full = math.ceil(space.support / space.spacing - 1e-9)
         layers = full if layers is None else layers

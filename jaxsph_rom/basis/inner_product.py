@@ -14,7 +14,12 @@ from .centring import Centring, RestCentred, Uncentred
 
 
 class InnerProduct(eqx.Module):
-    """<a, b> = sum over points and fields f of w_f a_f b_f; fields (rho, u)."""
+    """How states are measured, density and velocity together:
+
+        <a, b> = sum over points and fields f of w_f a_f b_f
+
+    with fields (rho, u).
+    """
 
     @abc.abstractmethod
     def weights(self, fluid: Fluid, dim: int) -> Float[Array, " fields"]:

@@ -93,6 +93,20 @@ def pod(
 
     Raises:
         ValueError: if there are fewer snapshots than modes, or a value is not finite.
+
+    Examples:
+        >>> import numpy as np
+        >>> from jaxsph import Fluid
+        >>> from jaxsph_rom import Energy, pod
+        >>> fluid = Fluid(reference_density=1000.0, sound_speed=10.0, reference_speed=1.0)
+        >>> x, t = np.linspace(0.0, 1.0, 50), np.linspace(0.0, 1.0, 9)
+        >>> wave = np.sin(2.0 * np.pi * (x[:, None] - t))  # a travelling wave has two modes
+        >>> snapshots = np.stack([1000.0 + wave, 0.0 * wave, 0.1 * wave], axis=1)
+        >>> basis = pod(snapshots, Energy(), fluid, modes=2)
+        >>> basis.modes.shape  # points, fields (density and velocity), modes
+        (50, 3, 2)
+        >>> bool(basis.singular_values[2] < 1e-6 * basis.singular_values[0])
+        True
     """
     points, fields, times = snapshots.shape
     count = min(points * fields, times)

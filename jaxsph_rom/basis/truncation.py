@@ -23,12 +23,21 @@ def projection_errors(singular_values: Float[np.ndarray, " k"]) -> Float[np.ndar
 def modes_for_energy(basis: Basis, percent: float) -> int:
     """The least number of modes with a cumulative energy, `cumulative_energy`, of `percent`.
 
-        basis = basis.truncated(modes_for_energy(basis, 99.9))
-
     Uncentred, the mean counts as energy, and one mode may have nearly all of it.
 
     Raises:
         ValueError: if it is not above 0 and at most 100, or takes more modes than the basis has.
+
+    Examples:
+        >>> import numpy as np
+        >>> from jaxsph import Fluid
+        >>> from jaxsph_rom import Energy, modes_for_energy, pod
+        >>> fluid = Fluid(reference_density=1000.0, sound_speed=10.0, reference_speed=1.0)
+        >>> phase = 2.0 * np.pi * (np.linspace(0.0, 1.0, 50)[:, None] - np.linspace(0.0, 1.0, 9))
+        >>> wave = np.sin(phase) + 0.01 * np.sin(2.0 * phase)  # two large modes, two small ones
+        >>> basis = pod(np.stack([1000.0 + wave, wave, wave], axis=1), Energy(), fluid)
+        >>> basis.truncated(modes_for_energy(basis, 98.0)).size
+        2
     """
     if not 0.0 < percent <= 100.0:
         raise ValueError(f"percent: {percent:g}; ask for more than 0 and at most 100.")
@@ -40,12 +49,21 @@ def modes_for_energy(basis: Basis, percent: float) -> int:
 def modes_for_error(basis: Basis, error: float) -> int:
     """The least number of modes that project the snapshots to a relative error at most `error`.
 
-        basis = basis.truncated(modes_for_error(basis, 0.01))
-
     It is an error in the norm of the basis' product, see `projection_errors`.
 
     Raises:
         ValueError: if it is not between 0 and 1, or takes more modes than the basis has.
+
+    Examples:
+        >>> import numpy as np
+        >>> from jaxsph import Fluid
+        >>> from jaxsph_rom import Energy, modes_for_error, pod
+        >>> fluid = Fluid(reference_density=1000.0, sound_speed=10.0, reference_speed=1.0)
+        >>> phase = 2.0 * np.pi * (np.linspace(0.0, 1.0, 50)[:, None] - np.linspace(0.0, 1.0, 9))
+        >>> wave = np.sin(phase) + 0.01 * np.sin(2.0 * phase)  # two large modes, two small ones
+        >>> basis = pod(np.stack([1000.0 + wave, wave, wave], axis=1), Energy(), fluid)
+        >>> basis.truncated(modes_for_error(basis, 0.05)).size
+        2
     """
     if not 0.0 <= error < 1.0:
         raise ValueError(f"error: {error:g}; ask for one from 0 to below 1.")

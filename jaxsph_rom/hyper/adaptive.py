@@ -79,8 +79,6 @@ def solve(
     Pure: jit and vmap it over viscosities (all runs then take as many turns as the longest), and
     differentiate it. Snapshots are interpolated between steps and do not shorten them.
 
-        run = solve(system, a, nu, times, solver=diffrax.Kvaerno5()).checked()
-
     Args:
         system: of the coordinates.
         coordinates: at time 0.
@@ -94,6 +92,16 @@ def solve(
             Forward mode needs `diffrax.ForwardMode()`.
         first_step: [s]; found by diffrax if none is given (a constant step needs one).
         max_steps: after which it gives up.
+
+    Examples:
+        >>> import jax.numpy as jnp
+        >>> from jaxsph_rom.hyper import QuadraticSystem
+        >>> from jaxsph_rom.hyper.adaptive import solve
+        >>> linear = jnp.asarray([[[0.0]], [[-1.0]]])  # da/dt = -nu a
+        >>> system = QuadraticSystem(jnp.zeros((2, 1)), linear, jnp.zeros((1, 1, 1)))
+        >>> run = solve(system, jnp.ones(1), jnp.asarray(0.5), jnp.asarray([0.0, 2.0])).checked()
+        >>> run.coordinates[-1].round(4)  # exp(-1)
+        Array([0.3679], dtype=...)
     """
     if controller is None:
         # small modes beside large ones need no relative accuracy of their own

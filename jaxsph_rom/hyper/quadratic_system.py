@@ -69,7 +69,9 @@ def advective(carried: Float[Array, "carrier test carried"]) -> Array:
 
 
 def skew_symmetric(carried: Float[Array, "carrier test carried"]) -> Array:
-    """u . grad w + (div u) w / 2, tested: the half of <v, u . grad w> - <w, u . grad v>.
+    """u . grad w + (div u) w / 2, tested with v:
+
+        (<v, u . grad w> - <w, u . grad v>) / 2.
 
     It moves energy between modes and makes none, whatever the divergence left in the discrete u.
     Here w is the fluctuation about rest: (div u) w / 2 of a uniform density would change the speed

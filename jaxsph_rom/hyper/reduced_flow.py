@@ -31,10 +31,6 @@ from .tensor_model import TensorModel
 class ReducedFlow(eqx.Module):
     """Basis and quadratic system of a flow on reference points; it knows no particles.
 
-        flow = ReducedFlow.train(scene, runs, points, modes=10)
-        coordinates = flow.predict(flow.project(position, velocity, density), viscosity, ...)
-        fields = flow.fields(coordinates)
-
     Args:
         reference: reference points and the map to them.
         basis: of (r, u), r the logarithmic density.
@@ -42,6 +38,21 @@ class ReducedFlow(eqx.Module):
         fluid: gives densities their scale.
         recovery: of velocity and pressure where modes are solenoidal; if there is none, fields are
             those of the modes.
+
+    Examples:
+        >>> import jax.numpy as jnp
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph_rom.hyper import ReducedFlow, mapped_run
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> run = jaxsph.run_scene(scene)
+        >>> flow = ReducedFlow.train(scene, [run], scene.state.position, modes=2)
+        >>> start = flow.project(mapped_run(flow.reference, run, scene.fluid))[0]
+        >>> viscosity = jnp.asarray(1.0 / 150.0)  # Re = 150; the run was at 100
+        >>> coordinates = flow.predict(start, viscosity, scene.time_step, 2, snapshots=3)
+        >>> fields = flow.fields(coordinates, run.time[1:])
+        >>> fields.velocity.shape  # snapshots, points, directions
+        (3, 256, 2)
     """
 
     reference: ReferenceSpace

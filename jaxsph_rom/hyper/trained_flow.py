@@ -19,10 +19,6 @@ from .sweep import sweep
 class TrainedFlow(eqx.Module):
     """A `ReducedFlow`, where its runs start and how they are stepped.
 
-        trained = load_flow("model.h5")
-        prediction = trained.predict(np.linspace(100.0, 250.0, 10_000))
-        fields = trained.fields(prediction, 5000)
-
     The start at a viscosity is interpolated linearly between those of the training runs, mode by
     mode, and is that of the nearest run outside their range.
 
@@ -37,6 +33,24 @@ class TrainedFlow(eqx.Module):
         scene: name of the scene.
         parameters: of the scene, JSON-like.
         training: how it was trained, what that cost and what errors are left, JSON-like.
+
+    Examples:
+        >>> import numpy as np
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph_rom.hyper import load_flow, save_flow, train_flows
+        >>> scenes = [
+        ...     jaxsph.scenes.taylor_green(16, reynolds, end_time=0.06, arrangement=Lattice())
+        ...     for reynolds in (100.0, 200.0)
+        ... ]
+        >>> runs = [jaxsph.run_scene(scene) for scene in scenes]
+        >>> (trained,) = train_flows(scenes, runs, modes=[2])
+        >>> save_flow("model.h5", trained)
+        >>> prediction = load_flow("model.h5").predict(np.linspace(100.0, 200.0, 1000))
+        >>> prediction.coordinates.shape  # members, times, modes
+        (1000, 4, 2)
+        >>> trained.fields(prediction, member=500).velocity.shape  # times, points, directions
+        (4, 256, 2)
     """
 
     flow: ReducedFlow

@@ -22,16 +22,21 @@ class LocalBases:
 
     from which a prediction takes its basis. A basis is trained on the closed interval
     [b_i, b_{i+1}], so a run at a border trains the bases on both sides. The paper's borders of the
-    Reynolds number are (50, 100, 150, 200). A study with local bases is an experiment an interval:
-
-        for experiment in LocalBases(borders).experiments(trained_on, reynolds, modes):
-            outcomes += study.run(experiment)
+    Reynolds number are (50, 100, 150, 200). A study with local bases is an experiment an interval.
 
     Args:
         borders: increasing, at least two, in the parameter's unit.
 
     Raises:
         ValueError: if the borders are too few or do not increase.
+
+    Examples:
+        >>> from jaxsph_rom import LocalBases
+        >>> bases = LocalBases((50.0, 100.0, 150.0))
+        >>> for experiment in bases.experiments((50.0, 100.0, 150.0), (75.0, 125.0), modes=(10,)):
+        ...     print(experiment.trained_on, experiment.reynolds)
+        (50.0, 100.0) (75.0,)
+        (100.0, 150.0) (125.0,)
     """
 
     borders: tuple[float, ...]

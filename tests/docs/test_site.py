@@ -1,0 +1,108 @@
+"""The documentation site builds strictly, holds every public name, and fetches nothing."""
+
+import html
+import importlib
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import jaxsph
+import jaxsph_rom
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def packages():
+    for top in (jaxsph, jaxsph_rom):
+        yield top.__name__
+        for found in pkgutil.walk_packages(top.__path__, f"{top.__name__}."):
+            if found.ispkg:
+                yield found.name
+
+
+def test_every_public_name_has_its_place(site):
+    missing = []
+    for package in packages():
+        page = site / "reference" / f"{package}.html"
+        text = page.read_text() if page.exists() else ""
+        for name, thing in vars(importlib.import_module(package)).items():
+            public = not name.startswith("_") and not isinstance(thing, ModuleType)
+            entry = rf">\s*{re.escape(package)}\.{name}\s*<"  # a heading, or a link to one
+            if public and not re.search(entry, text):
+                missing.append(f"{package}.{name}")
+    assert not missing
+
+
+def test_a_public_class_shows_its_arguments_and_where_it_is(site):
+    text = html.unescape(re.sub(r"<[^>]+>", "", (site / "reference/jaxsph.html").read_text()))
+    assert re.search(r"Fluid\(\s*reference_density,\s*sound_speed,\s*reference_speed", text)
+    assert "Source code in jaxsph/fluid.py" in text
+
+
+def test_effects_kernels_and_projections_have_their_equations():
+    """Beside the code: a page of equations has the module in a box."""
+    pages = "".join(page.read_text() for page in (ROOT / "docs/equations").glob("*.md"))
+    boxes = set(re.findall(r"^@computed (\S+)$", pages, re.MULTILINE))
+    wanted = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for folder in ("jaxsph/effects", "jaxsph/kernels", "jaxsph_rom/projection")
+        for path in (ROOT / folder).glob("*.py")
+        if path.stem not in ("__init__", "base", "spectral_radius")
+    }
+    assert wanted <= boxes
+
+
+def test_equations_are_shown_without_a_script(site):
+    for page in site.rglob("*.html"):
+        assert "arithmatex" not in page.read_text(), page.name  # each became MathML
+    assert (site / "equations/delta_plus.html").read_text().count("<math") > 10
+
+
+def test_nothing_is_fetched_while_reading(site):
+    loads = re.compile(r'<(?:script|img|iframe|link rel="(?:stylesheet|preconnect|icon)")[^>]*//')
+    for page in site.rglob("*.html"):
+        assert not loads.search(page.read_text()), page.name
+
+
+def test_figures_and_numbers_come_from_the_readme(site):
+    """A number stands in one place; the page has every table and figure of that section."""
+    readme, page = (ROOT / "README.md").read_text(), (site / "accuracy.html").read_text()
+    section = readme.partition("## What accuracy costs in time")[2].partition("\n## ")[0]
+    assert page.count("<table>") >= section.count("|---|\n") > 10
+    figures = re.findall(r"\(docs/(figures/\w+\.png)\)", section)
+    assert figures and all(f'src="{figure}"' in page for figure in figures)
+
+
+def test_a_section_that_is_gone_breaks_the_build(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs/hooks")
+    section = importlib.import_module("include").section
+    text = "# Title\nstart\n## One\nfirst\n### Inside\n## Two\nsecond\n"
+    assert section(text, "(start)") == "start\n"
+    assert section(text, "One") == "first\n## Inside\n"
+    with pytest.raises(KeyError):
+        section(text, "Three")
+
+
+def test_the_readme_says_how_it_is_built():
+    assert "python -m mkdocs build --strict" in (ROOT / "README.md").read_text()
