@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import lax
 
+from .effects import Effect
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
@@ -71,6 +72,10 @@ class FullModel(Model):
 
     def largest_change(self, old, new):
         return jnp.sqrt(jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1)))
+
+    def with_effect(self, effect: Effect):
+        """The same with other coefficients of one effect; see `SPHFunctional.with_effect`."""
+        return dataclasses.replace(self, functional=self.functional.with_effect(effect))
 
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -36,6 +38,26 @@ class SPHFunctional(eqx.Module):
     mass: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     space: Space = eqx.field(static=True)
     walls: Walls | None = None
+
+    def with_effect(self, effect: Effect) -> SPHFunctional:
+        """The same with an effect in place of its one of that kind: other coefficients, say.
+
+        Raises:
+            ValueError: if it has none of that kind.
+
+        Examples:
+            >>> import jaxsph
+            >>> from jaxsph.effects import LaminarViscosity
+            >>> functional = jaxsph.scenes.taylor_green(16).functional()
+            >>> float(functional.with_effect(LaminarViscosity(0.5)).effects[2].viscosity)
+            0.5
+        """
+        kinds = [type(e) for e in self.effects]
+        if type(effect) not in kinds:
+            names = ", ".join(e.name for e in self.effects)
+            raise ValueError(f"effect: there is no {effect.name} among {names}; name one of these.")
+        place = kinds.index(type(effect))
+        return replace(self, effects=(*self.effects[:place], effect, *self.effects[place + 1 :]))
 
     def __call__(
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList

@@ -10,6 +10,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional, WalledSearch
+from jaxsph.effects import Effect
 from jaxsph.full_model import (
     DENSITY_BOUNDS,
     SHIFT_SHARE,
@@ -195,6 +196,10 @@ class ReducedModel(Model):
             *list_checks(self.search, auxiliary, position),
             (FaultCode.SPLINE_CELL_OVERFLOW, self.interpolation.overflow(position), -1),
         )
+
+    def with_effect(self, effect: Effect):
+        """The same with other coefficients of one effect; see `SPHFunctional.with_effect`."""
+        return dataclasses.replace(self, functional=self.functional.with_effect(effect))
 
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())

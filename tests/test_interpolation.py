@@ -84,3 +84,28 @@ def test_a_narrow_periodic_box_is_refused():
     space = make_space(9)
     with pytest.raises(ValueError, match="three kernel supports"):
         MovingLeastSquaresMap.allocate(Lattice().positions(space), space)
+
+
+@pytest.mark.parametrize("rule", [ShepardMap, MovingLeastSquaresMap])
+def test_maps_have_a_reverse_mode(rule):
+    """Probes on a line leave cells partly filled, and one lies on a particle."""
+    space = make_space(12, periodic=False)
+    x = Lattice().positions(space)
+    line = jnp.stack([jnp.full(12, 0.5), jnp.linspace(0.04, 0.96, 12)], axis=1).at[3].set(x[40])
+    found = rule.allocate(line, space)
+
+    def total(x, values):
+        return jnp.sum(found(x, values)[0] ** 2)
+
+    values = jnp.sin(7.0 * x)
+    slopes = jax.jit(jax.grad(total, argnums=(0, 1)))(x, values)
+    along = jnp.cos(jnp.arange(x.size, dtype=x.dtype)).reshape(x.shape)
+    for slope, argument in zip(slopes, (0, 1), strict=True):
+        step = 1e-6
+        moved = [
+            [x, values][:argument] + [[x, values][argument] + s * step * along]
+            + [x, values][argument + 1 :]
+            for s in (1.0, -1.0)
+        ]  # fmt: skip
+        wanted = (total(*moved[0]) - total(*moved[1])) / (2.0 * step)
+        assert float(jnp.sum(slope * along)) == pytest.approx(float(wanted), rel=1e-6)

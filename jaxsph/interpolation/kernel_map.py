@@ -83,10 +83,15 @@ class KernelMap(eqx.Module):
             for k in range(dim):
                 separation = there[:, None, :, k] - here[:, :, None, k]
                 squared = squared + space.box.minimum_image(separation, k) ** 2
-            weight = space.kernel.value(jnp.sqrt(squared), space.smoothing_length, dim)
+            apart = squared > 0.0  # the root has no slope at zero; kernels have none there either
+            distance = jnp.where(apart, jnp.sqrt(jnp.where(apart, squared, 1.0)), 0.0)
+            weight = space.kernel.value(distance, space.smoothing_length, dim)
             weight = jnp.where((sources < position.shape[0])[:, None, :], weight, 0.0)
             columns = self.columns(from_center(there[..., :dim], center), there[..., dim:])
-            return self.fields(from_center(here, center), weight @ columns)
+            # rows of padding are cut off, or what their fields divide by spoils reverse mode
+            real = (targets < self.points.shape[0])[..., None]
+            sums = jnp.where(real, weight @ columns, 1.0)
+            return self.fields(from_center(here, center), sums)
 
         chunk = max(1, _BLOCK // (self.points_per_cell * around.shape[1]))
         found = chunked_map(evaluate, (self.bins.members[:-1], around, centers), chunk)

@@ -1,0 +1,1 @@
+"""Inverse problems that a user would recognise, solved by gradients through the models."""
