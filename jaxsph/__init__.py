@@ -25,6 +25,9 @@ from .pairs import pair_sum as pair_sum
 from .particles import ParticleState as ParticleState
 from .simulate import run_scene as run_scene
 from .simulate import simulate as simulate
+from .sweeps import read_member as read_member
+from .sweeps import read_status as read_status
+from .sweeps import sweep as sweep
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
 from .walls import BallRegion as BallRegion

@@ -18,6 +18,7 @@ from .basis import projection_errors as projection_errors
 from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
 from .field_advection import PaperAdvection as PaperAdvection
+from .hyper import sweep as sweep
 from .lattice_polynomials import LatticePolynomials as LatticePolynomials
 from .mode_interpolation import ModeInterpolation as ModeInterpolation
 from .model import ReducedModel as ReducedModel

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..integrate import explanation
 from ..scenes import SCENES
-from ..sweep import sweep
+from ..sweeps import sweep
 from .options import positive_int, print_rows, progress_bar, reynolds_numbers, seed
 from .scene_options import add_scene_options, check_scene, scene_settings
 

@@ -10,6 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int
 
 from jaxsph.integrate import integrate
@@ -50,7 +51,8 @@ def sweep(
 ) -> Sweep:
     """Run a flow from each start at its viscosity by `jax.vmap` of the time loop.
 
-    A member that meets a fault stops alone. The first batch runs twice, once to compile.
+    Members are shared out over this process' devices. One that meets a fault stops alone. The
+    first batch runs twice, once to compile.
 
     Args:
         flow: to run.
@@ -59,7 +61,7 @@ def sweep(
         time_step: dt [s].
         steps_per_snapshot: between snapshots.
         snapshots: number of intervals.
-        batch: members run at a time.
+        batch: members that a device runs at a time.
         progress: is called with the number of members done since its last call.
 
     Raises:
@@ -73,17 +75,19 @@ def sweep(
             f"starts: {starts.shape} for {count} viscosities and {flow.system.size} modes; give "
             "one start for each viscosity, and at least one."
         )
-    size = min(batch, count)
+    devices = jax.local_devices()
+    spread = NamedSharding(Mesh(np.asarray(devices), ("members",)), PartitionSpec("members"))
+    size = len(devices) * min(batch, -(-count // len(devices)))
     bound, step = flow.bound, jnp.asarray(time_step, dtype)
     coordinates = np.empty((count, snapshots, flow.system.size), dtype)
     faults = np.empty((2, count), np.int32)
     seconds, first = [], None
     for begin in range(0, count, size):
-        # the last batch is filled up from the members before it
-        rows = slice(max(0, min(begin, count - size)), min(begin + size, count))
+        rows = np.arange(begin, min(begin + size, count))
+        filled = np.resize(rows, size)  # the last batch repeats members to be full
         arguments = (
-            flow.system, bound, jnp.asarray(starts[rows]), jnp.asarray(viscosities[rows]), step,
-            steps_per_snapshot, snapshots,
+            flow.system, bound, jax.device_put(starts[filled], spread),
+            jax.device_put(viscosities[filled], spread), step, steps_per_snapshot, snapshots,
         )  # fmt: skip
         if first is None:
             before = clock.perf_counter()
@@ -92,9 +96,10 @@ def sweep(
         before = clock.perf_counter()
         found, code, at = jax.block_until_ready(_batch(*arguments))
         seconds.append(clock.perf_counter() - before)
-        coordinates[rows], faults[:, rows] = found, (code, at)
+        done = slice(len(rows))
+        coordinates[rows], faults[:, rows] = found[done], (code[done], at[done])
         if progress is not None:
-            progress(rows.stop - begin)
+            progress(len(rows))
     return Sweep(coordinates, *faults, sum(seconds), max(0.0, first - seconds[0]))
 
 

@@ -13,13 +13,12 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-import jaxsph
 from jaxsph import run_scene
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.cli import main
 from jaxsph.integrate import FaultCode
 from jaxsph.scenes import lid_driven_cavity, taylor_green
-from jaxsph.sweep import SweepFileError, read_member, read_status, sweep
+from jaxsph.sweeps import SweepFileError, read_member, read_status, sweep, sweep_file
 
 ROOT = Path(__file__).parents[2]
 SNAPSHOTS = 4  # of each member
@@ -30,8 +29,8 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_num_cpu_devices", int(sys.argv[1]))
 if len(sys.argv) > 3:
     jax.distributed.initialize(sys.argv[3], int(sys.argv[4]), int(sys.argv[5]))
-from jaxsph.sweep import sweep
-from tests.sweep.test_sweep import members
+from jaxsph.sweeps import sweep
+from tests.sweeps.test_sweep import members
 status = sweep(members(int(sys.argv[6]) if len(sys.argv) > 6 else 10), sys.argv[2],
                progress=lambda _: print("member", flush=True))
 assert (status.code == 0).all()
@@ -156,7 +155,7 @@ def test_what_is_no_sweep_is_refused(tmp_path):
     with pytest.raises(ValueError, match="number 1 differs from the first in name"):
         sweep([*members(1), lid_driven_cavity(12)], path)
     assert not path.exists()
-    jaxsph.sweep.sweep_file.create(path, members(2))
+    sweep_file.create(path, members(2))
     with pytest.raises(SweepFileError, match="has not been run"):
         read_member(path, 0)
     with pytest.raises(SweepFileError, match="has members 0 to 1, not 2"):
