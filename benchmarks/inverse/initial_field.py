@@ -43,6 +43,7 @@ def solve(
         "loss_reduced_by": descent.losses[0] / min(descent.losses),
         "field_error_percent": 100.0 * float(error),
         "losses": descent.losses,
+        "gradient_evaluations": descent.evaluations,
         "seconds": descent.seconds,
         "compile_seconds": descent.compile_seconds,
     }

@@ -81,6 +81,7 @@ def _memory(scene, trajectory, modes: int, steps: int) -> dict[str, Any]:
         "tau": float(jnp.exp(descent.best)),
         "time_step": scene.time_step,
         "losses": descent.losses,
+        "gradient_evaluations": descent.evaluations,
         "loss_reduced_by": descent.losses[0] / min(descent.losses),
         "seconds": descent.seconds,
         "compile_seconds": descent.compile_seconds,

@@ -28,6 +28,7 @@ class Descent(NamedTuple):
         best: parameters with the least loss.
         losses: before each step, and after the last.
         history: parameters at these.
+        evaluations: of the loss with its gradient, those of line searches with them.
         seconds: of all steps, without compilation.
         compile_seconds: before the first.
     """
@@ -35,6 +36,7 @@ class Descent(NamedTuple):
     best: Any
     losses: list[float]
     history: list[Any]
+    evaluations: int
     seconds: float
     compile_seconds: float
 
@@ -117,7 +119,7 @@ def descend(
     before = clock.perf_counter()
     step_now = step.lower(parameters, state).compile()
     compile_seconds = clock.perf_counter() - before
-    losses, history = [], [start]
+    losses, history, evaluations = [], [start], 0
     before = clock.perf_counter()
     with progress(label, steps) as report:
         for number in range(steps + 1):
@@ -130,6 +132,9 @@ def descend(
             if number < steps:
                 parameters = following
                 history.append(parameters)
+                searched = optax.tree_utils.tree_get(state, "num_linesearch_steps")
+                evaluations += 1 + (0 if searched is None else int(searched))
                 report(1)
     seconds = clock.perf_counter() - before
-    return Descent(history[int(np.argmin(losses))], losses, history, seconds, compile_seconds)
+    best = history[int(np.argmin(losses))]
+    return Descent(best, losses, history, evaluations, seconds, compile_seconds)

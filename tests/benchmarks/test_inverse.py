@@ -22,7 +22,7 @@ def usual_promotion():
 
 
 def test_viscosity_from_noisy_probes():
-    found = viscosity.solve(side=16, end_time=0.2, steps=12)
+    found = viscosity.solve(side=16, end_time=0.2, steps=5)
     assert found["error_percent"] < 0.2 * found["errors_percent"][0]  # a fifth of the guess's
     assert found["losses"][-1] < found["losses"][0]
 
@@ -34,7 +34,7 @@ def test_the_field_that_a_flow_started_from():
 
 
 def test_a_lid_for_a_wanted_line():
-    found = lid_profile.solve(side=12, end_time=0.2, knots=5, steps=8)
+    found = lid_profile.solve(side=12, end_time=0.2, knots=5, steps=4)
     assert found["line_error_percent"] < 0.7 * found["line_error_at_start_percent"]
 
 
@@ -47,7 +47,7 @@ def test_memory_length_and_closure():
 
 
 def test_through_a_reduced_model():
-    found = through_reduced.solve(side=16, modes=3, end_time=0.2, steps=20, iterations=60, every=8)
+    found = through_reduced.solve(side=16, modes=3, end_time=0.2, steps=8, iterations=60, every=8)
     assert found["error_percent"] < 10.0  # the first guess is off by 71
     assert np.isfinite(found["verified_velocity_error_percent"])
 
