@@ -20,7 +20,7 @@ REYNOLDS, FIRST_GUESS = 100.0, 40.0
 def solve(
     side: int = 32, end_time: float = 0.5, probes: int = 8, noise: float = 0.01, steps: int = 8
 ) -> dict[str, Any]:
-    """L-BFGS on log nu. The data are of a run with other particles; noise is of its largest value."""
+    """L-BFGS on log nu; data of a run with other particles, noise relative to its largest."""
     scenes = [
         taylor_green(side, reynolds, end_time=end_time, arrangement=JitteredLattice(seed=seed))
         for seed, reynolds in enumerate((REYNOLDS, FIRST_GUESS))
