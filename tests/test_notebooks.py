@@ -10,6 +10,9 @@ NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 CHECKS = {
     "01_first_flow": ("error", 0.05, "1024 particles; measured 0.01"),
     "02_why_a_reference_space": ("ratio", 0.05, "of two modes' errors; measured 0.02"),
+    "03_reduced_model_and_its_errors": ("velocity_error", 0.02, "two modes; measured 0.005"),
+    "04_stable_and_fast": ("velocity_error", 0.005, "five modes and closure; measured 0.002"),
+    "06_a_scene_of_your_own": ("derivative_error", 1e-6, "against a difference; measured 2e-12"),
 }
 
 
