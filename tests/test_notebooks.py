@@ -12,7 +12,9 @@ CHECKS = {
     "02_why_a_reference_space": ("ratio", 0.05, "of two modes' errors; measured 0.02"),
     "03_reduced_model_and_its_errors": ("velocity_error", 0.02, "two modes; measured 0.005"),
     "04_stable_and_fast": ("velocity_error", 0.005, "five modes and closure; measured 0.002"),
+    "05_inverse_problem_by_gradient": ("error", 0.03, "of the viscosity; measured 0.008"),
     "06_a_scene_of_your_own": ("derivative_error", 1e-6, "against a difference; measured 2e-12"),
+    "07_a_sweep_of_ten_thousand": ("velocity_error", 0.005, "at its peak; measured 0.0015"),
 }
 
 
