@@ -18,7 +18,7 @@ _LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)]+)(?=\))")
 
 
 def section(text: str, heading: str | None) -> str:
-    """All but the title, the part before the first second-level heading, or that under one.
+    """All but the title, the part before the first second-level heading, or that under a heading.
 
     Raises:
         KeyError: if there is no such heading.
@@ -26,10 +26,14 @@ def section(text: str, heading: str | None) -> str:
     text = re.sub(r"\A# .+\n", "", text)
     if heading is None:
         return text
-    parts = re.split(r"^## (.+)\n", text, flags=re.MULTILINE)
     if heading == "(start)":
-        return parts[0]
-    return moved_up(dict(zip(parts[1::2], parts[2::2], strict=True))[heading])
+        return re.split(r"^## ", text, flags=re.MULTILINE)[0]
+    start = re.search(rf"^(###?) {re.escape(heading)}\n", text, re.MULTILINE)
+    if start is None:
+        raise KeyError(heading)
+    rest = text[start.end() :]
+    level = len(start[1])
+    return moved_up(re.split(rf"^#{{2,{level}}} ", rest, flags=re.MULTILINE)[0])
 
 
 def moved_up(text: str) -> str:

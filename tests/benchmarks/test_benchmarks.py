@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks import (
     convergence,
+    extrapolation,
     inner_products,
     paper_rom,
     right_hand_side,
@@ -266,3 +267,19 @@ def test_inner_products_are_taken_up_again(tmp_path, capsys):
     assert again[:17] == read["rows"] and len(again) == 18
     assert inner_products.main([*same, "--cutoff", "7"]) == 2
     assert "other settings" in capsys.readouterr().err
+
+
+def test_beyond_the_time_trained_on(tmp_path, capsys):
+    path = tmp_path / "extrapolation.json"
+    small = ["--resolution", "16", "--predict", "125", "--modes", "3", "--iterations", "20"]
+    part = ["--end-time", "0.2", "--until", "0.1", "--out", str(tmp_path), "--json", str(path)]
+    assert extrapolation.main([*small, *part]) == 0
+    read = json.loads(path.read_text())
+    assert [row["closure"] for row in read["rows"]] == ["none", "linear"]
+    for row in read["rows"]:
+        assert row["stable"]
+        # both parts are judged, and beyond it is no better than its own modes allow
+        assert row["beyond_error_velocity_peak_percent"] > 0.0
+        assert row["trained_floor_velocity_peak_percent"] < 5.0
+    assert extrapolation.main([*small, *part, "--until", "0.5"]) == 2
+    assert "below the end time" in capsys.readouterr().err

@@ -19,6 +19,7 @@ TINY = "--resolution 16 --t-end 0.06 --arrangement lattice"
 # what makes a shown command small; a later option replaces an earlier one
 SMALLER = {
     ("jaxsph", "run"): TINY,
+    ("jaxsph", "sweep"): TINY,
     ("jaxsph-rom", "run"): f"{TINY} --train 100 200 --predict 150 --modes 2",
     ("jaxsph-rom", "train"): f"{TINY} --train 100 200 --modes 2 --closure-iterations 2",
 }
