@@ -43,17 +43,23 @@ class LinearClosure:
         held_back: Reynolds number of a training run that only judges, if there is one.
         window: intervals between snapshots in a window, if runs are so long.
         iterations: of the training.
+        learning_rate: at the start.
     """
 
     held_back: float | None = None
     window: int = 50
     iterations: int = 600
+    learning_rate: float = 0.02
 
     def __post_init__(self):
         if self.window < 1 or self.iterations < 1:
             raise ValueError(
                 f"closure: window and iterations must be at least 1, got {self.window} and "
                 f"{self.iterations}."
+            )
+        if not self.learning_rate > 0.0:
+            raise ValueError(
+                f"closure: the learning rate must be positive, got {self.learning_rate}."
             )
 
 
@@ -190,6 +196,7 @@ def _closed(flow, scenes, projected, closure, progress) -> tuple[ReducedFlow, di
             held_back=judge,
             window=min(closure.window, len(projected[0].coordinates) - 1),
             iterations=closure.iterations,
+            learning_rate=closure.learning_rate,
             progress=report,
         )
 
