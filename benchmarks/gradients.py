@@ -8,7 +8,7 @@ model of the vortex on moving particles: its derivatives in the viscosity (relat
 amplitude of a velocity field at the start, and in the positions at the start along a random
 direction. Central differences are of fourth order, at several steps; the best of each is what
 stands in the table, all are in the file. Then run time, and memory of the compiled programs, by
-number of steps.
+number of steps. What is in the file already is not done again.
 """
 
 from __future__ import annotations
@@ -43,12 +43,22 @@ from jaxsph_rom import (
     pod,
 )
 
-from .measure import alternate, format_rows, number, progress, summary, tell, write_json
+from .measure import (
+    alternate,
+    format_rows,
+    number,
+    progress,
+    read_json,
+    summary,
+    tell,
+    write_json,
+)
 
 PARAMETERS = ("viscosity", "velocity amplitude", "positions")
 DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)  # the parameters are of order one
 _BASE = (1.0, 1.0, 0.0)
 _MODES, _TRAINING_TIME = 5, 0.1  # s
+_MARGIN = 1.6  # of the list of the reduced model, whose particles come nearer to one another
 
 
 @dataclass(frozen=True)
@@ -99,11 +109,15 @@ def _command(argv) -> int:
     options = parser.parse_args(argv)
     check_target(options.json, overwrite=True)
     with jax.enable_x64(True):
-        results = {"environment": environment(), "steps": options.steps, "accuracy": [], "cost": []}
-        for make in (periodic, walled, reduced):
+        settings = {"side": options.side, "steps": options.steps}
+        results = read_json(options.json) or {"settings": settings, "accuracy": [], "cost": []}
+        if results.get("settings") != settings:
+            raise ValueError(f"{options.json}: was made with other settings; name another file.")
+        results |= {"environment": environment()}
+        for make in (periodic, walled, reduced)[len(results["accuracy"]) :]:
             results["accuracy"].append(accuracy(make(options.side), options.steps))
             write_json(options.json, results)
-        for steps in options.cost_steps:
+        for steps in options.cost_steps[len(results["cost"]) :]:
             results["cost"].append(cost(periodic(options.side), steps, options.repeats))
             write_json(options.json, results)
     print(_table(results))
@@ -133,7 +147,7 @@ def reduced(side: int) -> Flow:
     basis = pod(snapshots, Energy(), scene.fluid, _MODES)
     values = basis.functions.reshape(len(points), -1)
     splines = LocalSplines.fit(np.asarray(points), values, scene.space, 3)
-    model = ReducedModel.of_scene(scene, basis, splines, Galerkin(), ConsistentAdvection())
+    model = ReducedModel.of_scene(scene, basis, splines, Galerkin(), ConsistentAdvection(), _MARGIN)
     coordinates = jax.jit(lambda m, s: m.project(s))(model, scene.state).coordinates
 
     def start(model, parameters):
