@@ -2,7 +2,8 @@
 
 A line `@include README.md: In Python` is replaced by what stands under that heading, with the
 headings inside one level up; `@include README.md: (start)` by what stands before the first such
-heading, and `@include CHANGELOG.md` by all but the title. Links are made those of the page.
+heading, and `@include CHANGELOG.md` by all but the title. Links are made those of the page; what
+is no page, a notebook say, is named where it was linked.
 """
 
 import posixpath
@@ -14,7 +15,7 @@ from mkdocs.exceptions import PluginError
 ROOT = Path(__file__).parents[2]
 _DIRECTIVE = re.compile(r"^@include (?P<file>[\w./]+)(?:: (?P<heading>.+))?$", re.MULTILINE)
 _FENCE = re.compile(r"^(```.*?^```)$", re.MULTILINE | re.DOTALL)
-_LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)]+)(?=\))")
+_LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?!https?:|#)(?P<target>[^)]+)\)")
 
 
 def section(text: str, heading: str | None) -> str:
@@ -52,6 +53,11 @@ def on_page_markdown(markdown, page, config, files):
             found = section((ROOT / path).read_text(encoding="utf-8"), heading)
         except (FileNotFoundError, KeyError) as error:
             raise PluginError(f"{page.file.src_uri}: no '{heading}' in {path}.") from error
-        return _LINK.sub(lambda link: posixpath.relpath(link[0], here), found)
+        return _LINK.sub(linked, found)
+
+    def linked(link):
+        if not link["target"].startswith("docs/"):
+            return f"`{link['target']}`"
+        return f"[{link['text']}]({posixpath.relpath(link['target'], here)})"
 
     return _DIRECTIVE.sub(included, markdown)
