@@ -57,7 +57,7 @@ from .measure import (
 PARAMETERS = ("viscosity", "velocity amplitude", "positions")
 DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)  # the parameters are of order one
 _BASE = (1.0, 1.0, 0.0)
-_MODES, _TRAINING_TIME = 5, 0.1  # s
+_MODES, _TRAINING_TIME = 5, 0.75  # s, longer than the runs that are differentiated
 _MARGIN = 1.6  # of the list of the reduced model, whose particles come nearer to one another
 
 

@@ -33,6 +33,7 @@ def test_the_field_that_a_flow_started_from():
     assert found["field_error_percent"] < 30.0
 
 
+@pytest.mark.slow  # two minutes, most of them compilation
 def test_a_lid_for_a_wanted_line():
     found = lid_profile.solve(side=12, end_time=0.2, knots=5, steps=4)
     assert found["line_error_percent"] < 0.7 * found["line_error_at_start_percent"]
