@@ -1,7 +1,10 @@
 """Every test runs in double precision and without silent dtype or rank promotion."""
 
+from pathlib import Path
+
 import hypothesis
 import jax
+import pytest
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -10,3 +13,14 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 # An example that compiles is slow once; a failure must come back on the next run.
 hypothesis.settings.register_profile("jaxsph", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("jaxsph")
+
+_MAPPINGS = Path("/proc/self/maps")  # where there is such a thing
+_MOST = 25_000  # a process may have 65,530 on Linux
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room_for_programs():
+    """Each compiled program holds some mappings of memory; thousands of them end the process."""
+    yield
+    if _MAPPINGS.exists() and _MAPPINGS.read_bytes().count(b"\n") > _MOST:
+        jax.clear_caches()
