@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
-from ..effects import ArtificialViscosity, Gravity, NoSlip
+from ..effects import ArtificialViscosity, Effect, Gravity, NoSlip
 from ..kernels import Kernel
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
@@ -37,11 +37,12 @@ def dam_break(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    wall_velocity: Effect | None = None,
     dtype=None,
 ) -> Scene:
     """A column of water in the corner of a closed tank, let go at t = 0.
 
-    rho0 = 1000 kg/m^3, g = 9.81 m/s^2; water sticks to the walls, the start is hydrostatic.
+    rho0 = 1000 kg/m^3, g = 9.81 m/s^2; the start is hydrostatic.
     U = 3 (g H)^(1/2) with H the column's height: where jets meet, they compress the water by their
     speed over c0. The column and its tank are by default those of
     Martin and Moyce (1952), a = 0.05715 m wide and twice as high, in a tank 5 a long.
@@ -58,6 +59,8 @@ def dam_break(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given, which holds up a
+            tongue of a few particles' thickness; `FreeSlip()` does not.
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
@@ -70,6 +73,7 @@ def dam_break(
             f"column: {column[0]:g} m x {column[1]:g} m must fit the tank of {tank[0]:g} m x "
             f"{tank[1]:g} m and leave it room to fall."
         )
+    wall_velocity = NoSlip() if wall_velocity is None else wall_velocity
     vessel, height = BoxRegion((0.0, 0.0), tank), column[1]
 
     def effects(dtype):
@@ -78,7 +82,7 @@ def dam_break(
             ArtificialViscosity(jnp.asarray(alpha, dtype)),
             force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
             vessel=vessel,
-            wall_velocity=NoSlip(),
+            wall_velocity=wall_velocity,
         )
 
     return composed(
@@ -97,5 +101,11 @@ def dam_break(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "column": column, "tank": tank, "alpha": alpha},
+        parameters={
+            "scale": scale,
+            "column": column,
+            "tank": tank,
+            "alpha": alpha,
+            "wall_velocity": wall_velocity.name,
+        },
     )
