@@ -22,6 +22,7 @@ from ..references.lid_driven_cavity import CavityFlow, regularised_lid, solve
 from .settings import MOVING, SAMPLED, TENSOR, Case, FullSetting, ReducedSetting, Setting
 
 STARTS = {"quiet": Stirred, "packed": Packed, "rest": Lattice}
+_MANY = 100_000  # steps, enough for any setting's limit
 _MOST_JUDGED = 50  # snapshots, evenly spread over the time that counts
 
 
@@ -36,7 +37,7 @@ def make_scene(name: str, case: Case, setting: FullSetting, reynolds: float) -> 
         "mach": setting.mach,
         "dtype": setting.precision,
     }
-    cheap = SCENES[name](arrangement=Lattice(), **given)
+    cheap = SCENES[name](arrangement=Lattice(), time_step=case.end_time / _MANY, **given)
     interval = setting.step * cheap.stable_time_step * cheap.steps_per_snapshot
     steps = cheap.steps_per_snapshot * math.ceil(case.end_time / interval - 1e-9)
     scene = SCENES[name](
