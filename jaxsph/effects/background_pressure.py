@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .base import Effect
-from .free_surface import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
+from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
 
 
 class BackgroundPressure(Effect):

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from ..pairs import PairTerm
 from ..vector import Vector
 from .base import Effect, WallTerm
+from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
 
 _SPLASH = (0.25, 0.4)  # of completeness: single particles and thin jets lie below
 _INTERIOR = (0.95, 0.995)  # 0.50, 0.70, 0.94, 0.999 in the rows under a flat surface, h = 2 dx
@@ -15,15 +16,6 @@ def support_matrix(pair, i, j):
     """Upper triangle of (x_j - x_i) (x) grad_i W_ij V_j"""
     d, g = pair.separation, pair.gradient
     return Vector(d[a] * g[b] for a in range(len(d)) for b in range(a, len(d)))
-
-
-def kernel_gradient(pair, i, j):
-    """grad_i W_ij V_j"""
-    return pair.gradient
-
-
-KERNEL_GRADIENT = PairTerm("kernel_gradient", (), kernel_gradient)
-WALL_KERNEL_GRADIENT = WallTerm("kernel_gradient", (), (), kernel_gradient)
 
 
 class FreeSurface(Effect):

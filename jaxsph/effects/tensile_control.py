@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from .base import Effect
-from .free_surface import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
+from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
 
 
 class TensileControl(Effect):

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import LaminarViscosity
+from ..effects import BackgroundPressure, LaminarViscosity
 from ..kernels import Kernel
 from .composed import composed, pick_scale, positive
 from .delta_plus import delta_plus
@@ -19,6 +19,8 @@ SCALES = {
     "paper": Scale(resolution=256, h_over_dx=2.0, time_step=6.25e-4, steps_per_snapshot=40),
 }
 KICK = 0.05  # m/s, the cross flow that sets the layers rolling
+REFERENCE_DENSITY = 1000.0  # kg/m^3
+BACKGROUND_PRESSURE = 4.0 * REFERENCE_DENSITY  # Pa, with U = 1 m/s
 
 
 def shear_layer(
@@ -41,6 +43,9 @@ def shear_layer(
 
     Re = U L / nu, U = 1 m/s, L = 1 m, rho0 = 1000 kg/m^3. With d = 1/30 m each layer rolls into
     one vortex; with d = 1/80 m schemes without enough resolution make up more of them.
+
+    A background pressure of 4 rho0 U^2 keeps the vortices' cores, whose pressure sinks by up to
+    4 rho0 U^2, from negative pressure, where particles would clump.
 
     Args:
         resolution: particles per side; overrides the scale's, time step scaled along.
@@ -69,13 +74,14 @@ def shear_layer(
 
     return composed(
         "shear-layer",
-        effects=lambda dtype: delta_plus(
-            dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype))
+        effects=lambda dtype: (
+            *delta_plus(dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype))),
+            BackgroundPressure(jnp.asarray(BACKGROUND_PRESSURE, dtype)),
         ),
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
-        reference_density=1000.0,
+        reference_density=REFERENCE_DENSITY,
         reference_speed=1.0,
         mach=mach,
         velocity=velocity,
