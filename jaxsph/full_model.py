@@ -33,11 +33,21 @@ class FullModel(Model):
     functional: SPHFunctional
     search: NeighborSearch | WalledSearch
 
-    def prepare(self, state: ParticleState) -> VerletList:
+    def at(self, time):
+        walls = self.functional.walls
+        if walls is None or walls.bodies is None:
+            return self
+        walls = walls.at(time)
+        functional = dataclasses.replace(self.functional, walls=walls)
+        return dataclasses.replace(
+            self, functional=functional, search=self.search.moved(walls.position)
+        )
+
+    def prepare(self, state: ParticleState) -> VerletList | WallList:
         return self.search.build(state.position)
 
     def refresh(self, auxiliary, state, time_step):
-        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        speed = self._largest_speed(state)
         speed = speed + SHIFT_SHARE * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
@@ -70,6 +80,14 @@ class FullModel(Model):
             limit = jnp.minimum(limit, effect.step_limit(fluid, space))
         return lax.stop_gradient(limit)
 
+    def _largest_speed(self, state):
+        """Of a particle, or of a body that is moved."""
+        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        walls = self.functional.walls
+        if walls is None or walls.bodies is None:
+            return speed
+        return jnp.maximum(speed, walls.bodies.speed)
+
     def largest_change(self, old, new):
         return jnp.sqrt(jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1)))
 
@@ -91,14 +109,14 @@ class FullModel(Model):
 
 def refresh_list(search, neighbors: VerletList | WallList, position, motion):
     """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
-    moved = neighbors.largest_motion(search.box, position)[0]
+    moved = search.largest_motion(neighbors, position)[0]
     outdated = moved + lax.stop_gradient(motion) > 0.5 * search.skin
     return lax.cond(outdated, lambda x: search.build(x), lambda _: neighbors, position)
 
 
 def list_checks(search, neighbors: VerletList | WallList, position):
     """Checks that no neighbour was missed: capacities, and motion within the skin."""
-    moved, particle = neighbors.largest_motion(search.box, position)
+    moved, particle = search.largest_motion(neighbors, position)
     return (
         (FaultCode.NEIGHBOR_OVERFLOW, neighbors.overflow, -1),
         (FaultCode.NEIGHBORS_OUTDATED, moved > 0.5 * search.skin, particle),
