@@ -68,10 +68,11 @@ class FullModel(Model):
 
     def step_limit(self, state, change):
         """The least of 1.5 h / (c0 + |u|), 0.25 (h / |a|)^1/2 and the limits of the effects, with
-        the largest speed and acceleration of a particle; the paper's 1.5 h / c0 at rest."""
+        the largest speed of a particle or a body and the largest acceleration of a particle; the
+        paper's 1.5 h / c0 at rest."""
         functional = self.functional
         fluid, space = functional.fluid, functional.space
-        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        speed = self._largest_speed(state)
         limit = CFL * space.smoothing_length / (fluid.sound_speed + speed)
         forced = change > 0.0
         force = FORCE_SHARE * jnp.sqrt(space.smoothing_length / jnp.where(forced, change, 1.0))
