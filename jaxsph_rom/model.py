@@ -94,8 +94,8 @@ class ReducedModel(Model):
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's.
 
         Raises:
-            ValueError: if the interpolation is not of `basis.functions`, or bodies are moved through
-                the fluid.
+            ValueError: if the interpolation is not of `basis.functions`, or bodies are moved
+                through the fluid.
         """
         check_still(scene)
         wanted, found = basis.functions[0].size, interpolation.functions

@@ -51,8 +51,8 @@ class EulerianRates(eqx.Module):
         """Rates of a scene; its viscosity is a parameter of the call.
 
         Raises:
-            ValueError: if the box is too small for the kernel's support, or bodies are moved through
-                the fluid.
+            ValueError: if the box is too small for the kernel's support, or bodies are moved
+                through the fluid.
         """
         check_still(scene)
         effects = (*kept_effects(scene.effects), FieldAdvection())

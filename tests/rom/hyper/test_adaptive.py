@@ -114,7 +114,9 @@ def test_runs_at_many_viscosities_are_each_as_if_alone():
         return solve(oscillator(), FIRST, viscosity, TIMES)
 
     together = many(viscosities).checked()
-    controller = diffrax.PIDController(rtol=jnp.asarray(1e-6), atol=1e-6 * jnp.linalg.norm(FIRST))
+    controller = diffrax.PIDController(
+        rtol=jnp.asarray(1e-6), atol=1e-6 * jnp.linalg.norm(FIRST)
+    )
     for k, viscosity in enumerate(viscosities):
         alone = compiled(oscillator(), FIRST, viscosity, SOLVERS["explicit"], controller)
         np.testing.assert_allclose(together.coordinates[k], alone.coordinates, atol=1e-12)
@@ -128,7 +130,9 @@ def test_failure_is_named():
     assert not bool(run.good)
     with pytest.raises(SolverError, match=f"^the solver came to 1 of 10 times in {MAX_STEPS}"):
         run.checked()
-    runs = jax.tree.map(lambda *a: jnp.stack(a), solved(logistic(), "explicit", 1e-6, first), run)
+    runs = jax.tree.map(
+        lambda *a: jnp.stack(a), solved(logistic(), "explicit", 1e-6, first), run
+    )
     assert runs.good.tolist() == [True, False]
     with pytest.raises(SolverError, match="run 1: the solver came to 1 of 10"):
         runs.checked()

@@ -46,7 +46,9 @@ def test_a_matrix_found_by_probing_is_the_function(operators):
             apart[..., k] -= box.lengths[k] * np.round(apart[..., k] / box.lengths[k])
     near = np.linalg.norm(apart, axis=2) < 0.2
     weights = np.stack([near * apart[..., 0], near * (1.0 + apart[..., 1])], axis=2)
-    found = local_matrix(lambda v: np.einsum("ijc,jc->i", weights, v), points, 2, box, reach=0.2)
+    found = local_matrix(
+        lambda v: np.einsum("ijc,jc->i", weights, v), points, 2, box, reach=0.2
+    )
     np.testing.assert_allclose(found.toarray(), weights.reshape(len(points), -1), atol=1e-15)
 
 
