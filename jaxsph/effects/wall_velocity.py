@@ -53,8 +53,8 @@ class FreeSlip(Effect):
 
         u_i = <u>_i - 2 (<u>_i . n) n,
 
-    n the wall's normal, and the mean over the fluid particles as in `NoSlip`; beside walls that
-    move across themselves the normal part reversed is that of <u>_i - u_w.
+    n the wall's normal, and the mean over the fluid particles as in `NoSlip`; where bodies are
+    moved, the normal part reversed is that of the mean less the wall's velocity.
     """
 
     def ghost_terms(self, space):
