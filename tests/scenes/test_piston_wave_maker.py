@@ -2,12 +2,14 @@
 
 import math
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxsph import run_scene
+from jaxsph.integrate import integrate
 from jaxsph.scenes import piston_wave_maker
 from jaxsph.scenes.piston_wave_maker import (
     DEPTH,
@@ -70,3 +72,12 @@ def test_the_wave_is_as_high_as_linear_theory_says():
 def test_settings_out_of_range_are_named(options, message):
     with pytest.raises(ValueError, match=message):
         piston_wave_maker(**options)
+
+
+def test_single_precision_is_kept():
+    scene = piston_wave_maker(60, dtype=jnp.float32)
+    model, dt = scene.model(), jnp.asarray(scene.time_step, jnp.float32)
+    traced = jax.eval_shape(lambda s: integrate(model, s, np.int32(0), dt, 2, 1), scene.state)
+    arrays = [*jax.tree.leaves(eqx.filter(scene, eqx.is_array)), *jax.tree.leaves(traced)]
+    floats = {a.dtype for a in arrays if jnp.issubdtype(a.dtype, jnp.inexact)}
+    assert floats == {jnp.dtype(jnp.float32)}
