@@ -32,6 +32,7 @@ from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
 from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
+from .walls import MovingBody as MovingBody
 from .walls import MovingWall as MovingWall
 from .walls import Region as Region
 from .walls import SignedDistance as SignedDistance

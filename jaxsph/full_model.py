@@ -19,6 +19,7 @@ from .walls import Walls
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
 CFL = 1.5  # dt <= CFL h / c0 (paper)
 FORCE_SHARE = 0.25  # dt <= 0.25 (h / a)^1/2 (Monaghan 1992)
+SKIN_SHARE = 0.4  # of the neighbour list's skin in a step; half of it is a fault, and shifting adds
 SHIFT_SHARE = 0.5  # of the reference speed: the limit of the shift velocity
 
 
@@ -33,11 +34,21 @@ class FullModel(Model):
     functional: SPHFunctional
     search: NeighborSearch | WalledSearch
 
-    def prepare(self, state: ParticleState) -> VerletList:
+    def at(self, time):
+        walls = self.functional.walls
+        if walls is None or walls.bodies is None:
+            return self
+        walls = walls.at(time)
+        functional = dataclasses.replace(self.functional, walls=walls)
+        return dataclasses.replace(
+            self, functional=functional, search=self.search.moved(walls.position)
+        )
+
+    def prepare(self, state: ParticleState) -> VerletList | WallList:
         return self.search.build(state.position)
 
     def refresh(self, auxiliary, state, time_step):
-        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        speed = self._largest_speed(state)
         speed = speed + SHIFT_SHARE * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
@@ -57,18 +68,30 @@ class FullModel(Model):
         )
 
     def step_limit(self, state, change):
-        """The least of 1.5 h / (c0 + |u|), 0.25 (h / |a|)^1/2 and the limits of the effects, with
-        the largest speed and acceleration of a particle; the paper's 1.5 h / c0 at rest."""
+        """The least of 1.5 h / (c0 + |u|), 0.25 (h / |a|)^1/2, 0.4 s / |u| and the limits of the
+        effects, with the largest speed of a particle or a body, the largest acceleration of a
+        particle and the neighbour list's skin s; the paper's 1.5 h / c0 at rest."""
         functional = self.functional
         fluid, space = functional.fluid, functional.space
-        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        speed = self._largest_speed(state)
         limit = CFL * space.smoothing_length / (fluid.sound_speed + speed)
+        moving = speed > 0.0
+        outrun = SKIN_SHARE * self.search.skin / jnp.where(moving, speed, 1.0)
+        limit = jnp.where(moving, jnp.minimum(limit, outrun), limit)
         forced = change > 0.0
         force = FORCE_SHARE * jnp.sqrt(space.smoothing_length / jnp.where(forced, change, 1.0))
         limit = jnp.where(forced, jnp.minimum(limit, force), limit)
         for effect in functional.effects:
             limit = jnp.minimum(limit, effect.step_limit(fluid, space))
         return lax.stop_gradient(limit)
+
+    def _largest_speed(self, state):
+        """Of a particle, or of a body that is moved."""
+        speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
+        walls = self.functional.walls
+        if walls is None or walls.bodies is None:
+            return speed
+        return jnp.maximum(speed, walls.bodies.speed)
 
     def largest_change(self, old, new):
         return jnp.sqrt(jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1)))
@@ -91,14 +114,14 @@ class FullModel(Model):
 
 def refresh_list(search, neighbors: VerletList | WallList, position, motion):
     """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
-    moved = neighbors.largest_motion(search.box, position)[0]
+    moved = search.largest_motion(neighbors, position)[0]
     outdated = moved + lax.stop_gradient(motion) > 0.5 * search.skin
     return lax.cond(outdated, lambda x: search.build(x), lambda _: neighbors, position)
 
 
 def list_checks(search, neighbors: VerletList | WallList, position):
     """Checks that no neighbour was missed: capacities, and motion within the skin."""
-    moved, particle = neighbors.largest_motion(search.box, position)
+    moved, particle = search.largest_motion(neighbors, position)
     return (
         (FaultCode.NEIGHBOR_OVERFLOW, neighbors.overflow, -1),
         (FaultCode.NEIGHBORS_OUTDATED, moved > 0.5 * search.skin, particle),

@@ -30,7 +30,7 @@ class SPHFunctional(eqx.Module):
         fluid: reference density, sound speed, equation of state.
         mass: of a particle [kg].
         space: box, kernel, smoothing length and spacing (static).
-        walls: ghost particles, if the scene has walls.
+        walls: ghost particles, if the scene has walls; where they are at one time or another.
     """
 
     effects: tuple[Effect, ...]
@@ -86,7 +86,9 @@ class SPHFunctional(eqx.Module):
     ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
         """Context, fields and the sums of the second pass, in the list's sorted order."""
         state = jax.tree.map(neighbors.sort, state)
-        context = Context(time, self.fluid, self.mass, self.space)
+        walls = None if self.walls is None else self.walls.at(time)
+        bodies = None if walls is None else walls.bodies
+        context = Context(time, self.fluid, self.mass, self.space, bodies)
         fields = {
             "position": state.position,
             "velocity": state.velocity,
@@ -94,7 +96,7 @@ class SPHFunctional(eqx.Module):
             "pressure": self.fluid.pressure(state.density),
             "volume": self.mass / state.density,
         }
-        ghosts = {} if self.walls is None else self._ghosts(context, fields, neighbors)
+        ghosts = {} if walls is None else self._ghosts(context, walls, fields, neighbors)
         with jax.named_scope("geometry_pass"):
             sums = self._sums("geometry_terms", fields, ghosts, neighbors)
         for effect in self.effects if sums else ():
@@ -111,20 +113,28 @@ class SPHFunctional(eqx.Module):
         if self.walls is None:
             return pair_sum(terms, fields, self.space, neighbors)
         sums = pair_sum(terms, fields, self.space, neighbors.fluid)
-        terms = tuple(t for e in self.effects for t in getattr(e, f"wall_{kind}")(self.space))
+        terms = self._wall_terms(f"wall_{kind}")
         with jax.named_scope("walls"):
             added = wall_sums(terms, fields, ghosts, self.space, neighbors.wall)
         return {name: s + added[name] if name in added else s for name, s in sums.items()}
 
-    def _ghosts(self, context, fields, neighbors: WallList) -> dict[str, Array]:
+    def _wall_terms(self, kind: str) -> tuple:
+        """The effects' terms of ghosts, of that kind; those for moving bodies where there are."""
+        kind = kind if self.walls.bodies is None else f"moving_{kind}"
+        return tuple(t for e in self.effects for t in getattr(e, kind)(self.space))
+
+    def _ghosts(self, context, walls: Walls, fields, neighbors: WallList) -> dict[str, Array]:
         """Fields of the ghosts, as the wall effects give them."""
-        walls, order = self.walls, neighbors.wall.ghosts
+        order = neighbors.wall.ghosts
         ghosts = {
             "position": walls.position[order],
             "normal": walls.normal[order],
             "wall_velocity": walls.velocity[order],
         }
-        terms = tuple(t for e in self.effects for t in e.ghost_terms(self.space))
+        if walls.bodies is not None:
+            acceleration = walls.bodies.of_ghosts(walls.bodies.acceleration)
+            ghosts["wall_acceleration"] = acceleration[order]
+        terms = self._wall_terms("ghost_terms")
         with jax.named_scope("ghost_pass"):
             sums = ghost_sums(terms, fields, ghosts, self.space, neighbors.wall)
         for effect in self.effects:

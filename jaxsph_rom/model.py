@@ -25,6 +25,7 @@ from .basis import Basis
 from .field_advection import Advection, PaperAdvection
 from .mode_interpolation import ModeInterpolation
 from .projection import Projection, PseudoInverse
+from .still_walls import check_still
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
 
@@ -93,8 +94,10 @@ class ReducedModel(Model):
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's.
 
         Raises:
-            ValueError: if the interpolation is not of `basis.functions`.
+            ValueError: if the interpolation is not of `basis.functions`, or bodies are moved
+                through the fluid.
         """
+        check_still(scene)
         wanted, found = basis.functions[0].size, interpolation.functions
         if found != wanted:
             raise ValueError(

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from ..fluid import Fluid
 from ..pairs import PairTerm, Space
+from ..walls.moving_body import Bodies
 
 
 class Context(NamedTuple):
@@ -21,6 +22,7 @@ class Context(NamedTuple):
     fluid: Fluid
     mass: Float[Array, ""]
     space: Space
+    bodies: Bodies | None = None
 
 
 class WallTerm(NamedTuple):
@@ -56,7 +58,8 @@ class Effect(eqx.Module):
     Where a scene has walls, a pass over the ghosts comes first: its sums over fluid particles
     (`ghost_terms`) give the ghosts their values (`ghost_fields`); and in both other passes ghosts
     add to the sums what an effect's `wall_geometry_terms` and `wall_rate_terms` say. Without walls
-    none of these is called.
+    none of these is called. Where bodies are moved through the fluid, ghosts have a
+    `wall_acceleration` [m/s^2] as well, and the `moving_` forms of these methods are called.
 
     Coefficients that one may sweep or differentiate are array fields; what changes the structure
     of the computation is static.
@@ -98,6 +101,18 @@ class Effect(eqx.Module):
     def wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
         """What ghosts add to sums of the second pass."""
         return ()
+
+    def moving_ghost_terms(self, space: Space) -> tuple[PairTerm, ...]:
+        """`ghost_terms` where walls move across themselves."""
+        return self.ghost_terms(space)
+
+    def moving_wall_geometry_terms(self, space: Space) -> tuple[WallTerm, ...]:
+        """`wall_geometry_terms` where walls move across themselves."""
+        return self.wall_geometry_terms(space)
+
+    def moving_wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
+        """`wall_rate_terms` where walls move across themselves."""
+        return self.wall_rate_terms(space)
 
     def rates(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
         """Contributions to the rates of `position`, `velocity` and `density`."""

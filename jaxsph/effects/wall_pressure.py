@@ -24,6 +24,8 @@ def ghost_moment(pair, i, j):
 
 _REACHED = 1e-20  # of W(dx): so little that a ghost's values do not jump as particles come
 GHOST_WEIGHT = PairTerm("ghost_weight", (), ghost_weight)
+_MEAN = (GHOST_WEIGHT, PairTerm("ghost_pressure", ("pressure",), ghost_pressure))
+_MOMENT = PairTerm("ghost_moment", ("density",), ghost_moment)
 
 
 class WallPressure(Effect):
@@ -32,7 +34,9 @@ class WallPressure(Effect):
         p_i = [sum_j p_j W_ij + b . sum_j rho_j (x_i - x_j) W_ij] / sum_j W_ij,
 
     its density from the equation of state, and its volume from that. b is the body force [m/s^2]
-    at the ghost; without one its sum is not computed. A ghost out of reach of the fluid has p = 0.
+    at the ghost, less the acceleration of the body that the ghost is part of where bodies are moved
+    (their eq. 27, too); without either that sum is not computed. A ghost out of reach of the fluid
+    has p = 0.
 
     Args:
         force: the scene's body force, if it has one.
@@ -41,15 +45,19 @@ class WallPressure(Effect):
     force: BodyForce | None = None
 
     def ghost_terms(self, space):
-        terms = (GHOST_WEIGHT, PairTerm("ghost_pressure", ("pressure",), ghost_pressure))
-        if self.force is not None:
-            terms += (PairTerm("ghost_moment", ("density",), ghost_moment),)
-        return terms
+        return _MEAN if self.force is None else (*_MEAN, _MOMENT)
+
+    def moving_ghost_terms(self, space):
+        return (*_MEAN, _MOMENT)
 
     def ghost_fields(self, context, ghosts, sums):
         pressure = sums["ghost_pressure"]
+        accelerations = []
         if self.force is not None:
-            acceleration = self.force.acceleration(context.time, ghosts["position"])
+            accelerations.append(self.force.acceleration(context.time, ghosts["position"]))
+        if "wall_acceleration" in ghosts:
+            accelerations.append(-ghosts["wall_acceleration"])
+        for acceleration in accelerations:
             pressure = pressure + jnp.sum(acceleration * sums["ghost_moment"], axis=1)
         pressure = per_weight(pressure, sums["ghost_weight"], context.space)
         density = context.fluid.density(pressure)

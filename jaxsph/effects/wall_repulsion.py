@@ -23,13 +23,13 @@ class WallRepulsion(Effect):
     forces go back to Monaghan (1994).
 
     Args:
-        fluid_region: where fluid may be (static).
+        fluid_region: where fluid may be (static); the scene's moving bodies repel as well.
     """
 
     fluid_region: Region = eqx.field(static=True)
 
     def rates(self, context, fields, sums):
-        distance, spacing = self.fluid_region.signed_distance, context.space.spacing
+        distance, spacing = self._distance(context.bodies), context.space.spacing
         position, reach = fields["position"], _RANGE * spacing
         # a distance has no slope in the middle of a vessel, where a lattice may have a particle
         far = distance(lax.stop_gradient(position)) <= -reach
@@ -38,3 +38,10 @@ class WallRepulsion(Effect):
         outward = jax.vmap(jax.grad(lambda x: distance(x[None, :])[0]))(position)
         strength = _STRENGTH * context.fluid.sound_speed**2 / spacing
         return {"velocity": -(strength * closeness**2)[:, None] * outward}
+
+    def _distance(self, bodies):
+        """Positions -> distances to the nearest wall."""
+        fixed = self.fluid_region.signed_distance
+        if bodies is None:
+            return fixed
+        return lambda x: jnp.maximum(fixed(x), -bodies.signed_distance(x))

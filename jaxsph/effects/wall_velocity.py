@@ -53,7 +53,8 @@ class FreeSlip(Effect):
 
         u_i = <u>_i - 2 (<u>_i . n) n,
 
-    n the wall's normal, and the mean over the fluid particles as in `NoSlip`.
+    n the wall's normal, and the mean over the fluid particles as in `NoSlip`; where bodies are
+    moved, the normal part reversed is that of the mean less the wall's velocity.
     """
 
     def ghost_terms(self, space):
@@ -61,5 +62,7 @@ class FreeSlip(Effect):
 
     def ghost_fields(self, context, ghosts, sums):
         near, normal = _near_velocity(sums, context.space), ghosts["normal"]
-        along = jnp.sum(near * normal, axis=1, keepdims=True)
-        return {"velocity": near - 2.0 * along * normal}
+        moving = "wall_acceleration" in ghosts
+        approach = near - ghosts["wall_velocity"] if moving else near
+        across = jnp.sum(approach * normal, axis=1, keepdims=True)
+        return {"velocity": near - 2.0 * across * normal}

@@ -16,6 +16,14 @@ class Model(eqx.Module):
     """A dynamical system dy/dt = f(t, y) with an auxiliary structure (a neighbour list, say) that
     is rebuilt now and then and is not differentiated."""
 
+    def at(self, time: Float[Array, ""]) -> Model:
+        """The model at a time [s], its walls where they are then; itself if it has none that move.
+
+        `prepare`, `refresh`, `inspect` and `step_limit` are asked of this one; `rates` knows its
+        time, and may be asked of either.
+        """
+        return self
+
     @abc.abstractmethod
     def prepare(self, state: Any) -> Any:
         """The auxiliary structure for a state, built anew."""

@@ -48,10 +48,10 @@ class Stepping(eqx.Module):
 
 def _step(model: Model, state, auxiliary, number, time, time_step):
     """One RK4 step, checked: the last good state, the auxiliary structure and the fault."""
-    auxiliary = model.refresh(auxiliary, state, time_step)
+    auxiliary = model.at(time).refresh(auxiliary, state, time_step)
     new = rk4_step(lambda t, y: model.rates(t, y, auxiliary), time, state, time_step)
     new = model.finish(new)
-    fault = model.inspect(number, new, auxiliary)
+    fault = model.at(time + time_step).inspect(number, new, auxiliary)
     good = fault.code == int(FaultCode.NONE)
     kept = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, state)
     return kept, auxiliary, fault
@@ -72,7 +72,8 @@ class FixedSteps(Stepping):
             return lax.cond(good, move, lambda carry: carry, carry)
 
         numbers = start + 1 + jnp.arange(steps, dtype=jnp.int32)
-        carry = (state, model.prepare(state), fault)
+        began = start.astype(time_step.dtype) * time_step
+        carry = (state, model.at(began).prepare(state), fault)
         state, _, fault = checkpointed_scan(step, carry, numbers, segment)
         return state, fault
 
@@ -96,7 +97,7 @@ class AutomaticSteps(Stepping):
             raise ValueError(f"most: at least 1, got {self.most}.")
 
     def advance(self, model, state, fault, start, time_step, steps, segment):
-        duration = steps * time_step
+        duration, began = steps * time_step, start.astype(time_step.dtype) * time_step
 
         def going(carry):
             _, _, fault, elapsed, _ = carry
@@ -106,10 +107,10 @@ class AutomaticSteps(Stepping):
         def move(carry):
             state, auxiliary, _, elapsed, change = carry
             left = duration - elapsed
-            step = left / jnp.ceil(left / model.step_limit(state, change))
+            time = began + elapsed
+            step = left / jnp.ceil(left / model.at(time).step_limit(state, change))
             step = jnp.where(jnp.isfinite(step), step, time_step)  # the step's checks name the rest
             number = start + jnp.ceil((elapsed + step) / time_step - _ENDED).astype(jnp.int32)
-            time = start.astype(time_step.dtype) * time_step + elapsed
             new, auxiliary, fault = _step(model, state, auxiliary, number, time, step)
             return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
 
@@ -117,7 +118,7 @@ class AutomaticSteps(Stepping):
             return lax.cond(going(carry), move, lambda carry: carry, carry)
 
         zero = jnp.zeros((), time_step.dtype)
-        carry = (state, model.prepare(state), fault, zero, zero)
+        carry = (state, model.at(began).prepare(state), fault, zero, zero)
         carry = checkpointed_scan(step, carry, jnp.arange(self.most * steps), segment)
         state, _, fault, elapsed, _ = carry
         short = going(carry)

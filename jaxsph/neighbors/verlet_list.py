@@ -118,6 +118,10 @@ class NeighborSearch(eqx.Module):
             cell_capacity=math.ceil(1.2 * self.cell_capacity),
         )
 
+    def largest_motion(self, neighbors: VerletList, position: Array) -> tuple[Array, Array]:
+        """The longest way [m] that a particle has gone since the list was built, and which one."""
+        return neighbors.largest_motion(self.box, position)
+
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
         """The list of all neighbours within support + skin of each particle, inside jit."""
         position = lax.stop_gradient(position)

@@ -55,11 +55,15 @@ class WallPairs(eqx.Module):
 
 
 class WallList(eqx.Module):
-    """The Verlet list of the fluid, and the pairs that it makes with ghosts."""
+    """The Verlet list of the fluid, and the pairs that it makes with ghosts.
+
+    `ghosts` is where these were when the list was built, if they move.
+    """
 
     fluid: VerletList
     wall: WallPairs
     crowded: Bool[Array, ""]
+    ghosts: Float[Array, "ghosts dim"] | None = None
 
     def sort(self, field: Array) -> Array:
         """A per-particle field in the fluid list's cell-sorted order."""
@@ -87,12 +91,13 @@ class WalledSearch(eqx.Module):
     """Search for the neighbours of fluid particles among themselves and among ghosts.
 
     Only particles that may come within reach of a ghost have rows in the list of wall pairs; the
-    cells of `reach_grid` marked in `within_reach` tell which.
+    cells of `reach_grid` marked in `within_reach` tell which. Where ghosts move, these are the
+    particles with a ghost in the cells of `wall_grid` around their own.
 
     Args:
         fluid: search among the fluid's particles.
         ghosts: positions of the ghosts (G, n) [m].
-        within_reach: marks of cells from which a ghost can be seen.
+        within_reach: marks of cells from which a ghost can be seen; None where ghosts move.
         reach_grid: cells about half a spacing wide.
         wall_grid: cells over the fluid's box and its ghosts.
         near_capacity: particles that can be near a wall.
@@ -102,7 +107,7 @@ class WalledSearch(eqx.Module):
 
     fluid: NeighborSearch
     ghosts: Float[Array, "ghosts dim"]
-    within_reach: Bool[Array, " cells"]
+    within_reach: Bool[Array, " cells"] | None
     reach_grid: CellGrid = eqx.field(static=True)
     wall_grid: CellGrid = eqx.field(static=True)
     near_capacity: int = eqx.field(static=True)
@@ -120,8 +125,11 @@ class WalledSearch(eqx.Module):
         skin: float,
         spacing: float,
         margin: float = CAPACITY_MARGIN,
+        moving: bool = False,
     ) -> WalledSearch:
         """Choose capacities for particles near `position`, `margin` times what these need.
+
+        `moving` tells whether the ghosts will be elsewhere when lists are built.
 
         Raises:
             ValueError: as `NeighborSearch.allocate`.
@@ -133,23 +141,25 @@ class WalledSearch(eqx.Module):
         half_diagonal = 0.5 * math.hypot(*reach_grid.widths)
         within_reach = jnp.asarray(distance < radius + half_diagonal)
         wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
-        near = within_reach[reach_grid.locate(position)]
-        free = np.asarray(within_reach) & (distance > 0.72 * spacing)  # between ghosts is no room
-        room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
-        count = int(near.sum())
-        count = room if count < _FILLED * room else count  # fluid may flow there yet
-        most = min(position.shape[0], int(np.ceil(margin * count)) + 1)
+        most_ghosts = wall_grid.occupancy(ghosts)
         trial = cls(
             fluid,
             ghosts,
-            within_reach,
+            None if moving else within_reach,
             reach_grid,
             wall_grid,
-            most,
+            1,
             1,
             int(1.3 * wall_grid.occupancy(position)) + 2,
-            wall_grid.occupancy(ghosts),
+            int(1.3 * most_ghosts) + 2 if moving else most_ghosts,
         )
+        near = np.asarray(trial._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
+        free = near & (distance > 0.72 * spacing)  # between ghosts is no room
+        room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
+        count = int(trial._may_see(position).sum())
+        count = room if count < _FILLED * room else count  # fluid may flow there yet
+        most = min(position.shape[0], int(np.ceil(margin * count)) + 1)
+        trial = replace(trial, near_capacity=most)
         largest = int(_most_ghosts(trial, position))
         return replace(trial, capacity=max(8, int(np.ceil(margin * largest))))
 
@@ -163,13 +173,29 @@ class WalledSearch(eqx.Module):
 
     def enlarged(self) -> WalledSearch:
         """The same search with a fifth more room."""
+        more = 1.0 if self.within_reach is not None else 1.2  # only ghosts that move may crowd
         return replace(
             self,
             fluid=self.fluid.enlarged(),
             near_capacity=math.ceil(1.2 * self.near_capacity),
             capacity=math.ceil(1.2 * self.capacity),
             near_cell_capacity=math.ceil(1.2 * self.near_cell_capacity),
+            ghost_cell_capacity=math.ceil(more * self.ghost_cell_capacity),
         )
+
+    def moved(self, ghosts: Float[Array, "ghosts dim"]) -> WalledSearch:
+        """The same search with its ghosts elsewhere [m]."""
+        return replace(self, ghosts=lax.stop_gradient(ghosts))
+
+    def largest_motion(self, neighbors: WallList, position: Array) -> tuple[Array, Array]:
+        """The longest way [m] that a particle or a ghost has gone since the list was built, and
+        which particle, -1 for a ghost."""
+        way, particle = neighbors.largest_motion(self.box, position)
+        if neighbors.ghosts is None:
+            return way, particle
+        ghost_way = self.box.displacement(neighbors.ghosts, self.ghosts)
+        ghost_way = jnp.sqrt(jnp.max(jnp.sum(ghost_way * ghost_way, axis=1)))
+        return jnp.maximum(way, ghost_way), jnp.where(way >= ghost_way, particle, -1)
 
     def build(self, position: Float[Array, "particles dim"]) -> WallList:
         """All pairs within support + skin, of two particles or of a particle and a ghost."""
@@ -183,12 +209,21 @@ class WalledSearch(eqx.Module):
                 pick(*seeing, self.capacity, own=count),
             ]
         )
-        return WallList(fluid, WallPairs(index, near, ghosts), overflow)
+        built_at = self.ghosts if self.within_reach is None else None
+        return WallList(fluid, WallPairs(index, near, ghosts), overflow, built_at)
+
+    def _may_see(self, position) -> Bool[Array, " points"]:
+        """Whether a ghost may be within support + skin of each point."""
+        if self.within_reach is not None:
+            return self.within_reach[self.reach_grid.locate(position)]
+        grid = self.wall_grid
+        held = jnp.zeros(grid.cells + 1, bool).at[grid.locate(self.ghosts)].set(True)
+        return jnp.any(held[grid.stencil], axis=1)[grid.locate(position)]
 
     def _flag(self, position):
         """Near particles and ghosts, each in cell order; and the flags of each among the other."""
         grid = self.wall_grid
-        within = self.within_reach[self.reach_grid.locate(position)]
+        within = self._may_see(position)
         # particles that are not near fill the rows left over: real ones, which see no ghost
         near = jnp.argsort(~within, stable=True)[: self.near_capacity].astype(jnp.int32)
         particles = grid.bin(position[near], self.near_cell_capacity)

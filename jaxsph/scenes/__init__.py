@@ -10,6 +10,7 @@ from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity
 from .open_cavity import open_cavity as open_cavity
 from .oscillating_drop import oscillating_drop as oscillating_drop
+from .piston_wave_maker import piston_wave_maker as piston_wave_maker
 from .poiseuille import poiseuille as poiseuille
 from .rotating_square_patch import rotating_square_patch as rotating_square_patch
 from .scales import Scale as Scale
@@ -31,6 +32,7 @@ SCENES = {
     "elliptic-drop": elliptic_drop,
     "gresho-vortex": gresho_vortex,
     "oscillating-drop": oscillating_drop,
+    "piston-wave-maker": piston_wave_maker,
     "rotating-square-patch": rotating_square_patch,
     "shear-layer": shear_layer,
     "standing-wave": standing_wave,

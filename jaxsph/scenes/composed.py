@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array
@@ -83,7 +84,7 @@ def composed(
         ),
     )
     around = None if walls is None else walls(space)
-    region = around.fluid_region if region is None and around is not None else region
+    region = around.start_region if region is None and around is not None else region
     position = arrangement.positions(space)
     if region is not None:
         position = fill(region, arrangement.places(space), position)
@@ -110,7 +111,7 @@ def composed(
             "kernel": type(kernel).__name__,
             "dtype": str(dtype),
         },
-        walls=jax.tree.map(lambda a: a.astype(dtype), around),
+        walls=jax.tree.map(lambda a: a.astype(dtype) if eqx.is_inexact_array(a) else a, around),
     )
 
 

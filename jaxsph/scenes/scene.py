@@ -129,6 +129,7 @@ class Scene(eqx.Module):
             skin,
             self.space.spacing,
             _WALL_MARGIN if margin is None else margin,
+            moving=self.walls.bodies is not None,
         )
 
     def model(self, state: ParticleState | None = None, margin: float | None = None) -> FullModel:

@@ -65,10 +65,16 @@ def stacked(scenes: Sequence[Scene]) -> Members:
         for model, scene in zip(models, scenes, strict=True)
     ]
     first, structure = members[0]
+    same = jax.tree.leaves(structure)  # functions that move bodies, say
     for k, (arrays, static) in enumerate(members):
-        if jax.tree.structure((arrays, static)) != jax.tree.structure((first, structure)) or any(
-            a.shape != b.shape or a.dtype != b.dtype
-            for a, b in zip(jax.tree.leaves(arrays), jax.tree.leaves(first), strict=True)
+        alike = jax.tree.structure((arrays, static)) == jax.tree.structure((first, structure))
+        if (
+            not alike
+            or jax.tree.leaves(static) != same
+            or any(
+                a.shape != b.shape or a.dtype != b.dtype
+                for a, b in zip(jax.tree.leaves(arrays), jax.tree.leaves(first), strict=True)
+            )
         ):
             raise ValueError(
                 f"scenes: number {k} has other effects, walls or particles than the first; make "

@@ -1,5 +1,7 @@
-"""Solid walls: where they are, and the fixed ghost particles that stand for them."""
+"""Solid walls: where they are, and the ghost particles that stand for them."""
 
+from .moving_body import Bodies as Bodies
+from .moving_body import MovingBody as MovingBody
 from .region import BallRegion as BallRegion
 from .region import BoxRegion as BoxRegion
 from .region import Region as Region

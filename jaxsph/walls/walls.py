@@ -1,4 +1,4 @@
-"""Walls as layers of fixed ghost particles (Adami, Hu and Adams 2012)."""
+"""Walls as layers of ghost particles (Adami, Hu and Adams 2012)."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from jaxtyping import Array, Bool, Float
 from ..arrangements import Lattice
 from ..domain import Box
 from ..pairs import Space
+from .moving_body import Bodies, MovingBody
 from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
@@ -45,14 +46,16 @@ class Walls(eqx.Module):
     Args:
         position: of the ghosts (G, n) [m].
         normal: unit normals (G, n) of the nearest wall, towards the fluid.
-        velocity: of the wall at each ghost (G, n) [m/s]; along the wall.
-        fluid_region: where fluid may be (static).
+        velocity: of the wall at each ghost (G, n) [m/s].
+        fluid_region: where fluid may be, but for moving bodies (static).
+        bodies: that move across themselves, if there are any, where they are now.
     """
 
     position: Float[Array, "ghosts dim"]
     normal: Float[Array, "ghosts dim"]
     velocity: Float[Array, "ghosts dim"]
     fluid_region: Region = eqx.field(static=True)
+    bodies: Bodies | None = None
 
     @classmethod
     def around(
@@ -61,6 +64,7 @@ class Walls(eqx.Module):
         space: Space,
         moving: Sequence[MovingWall] = (),
         layers: int | None = None,
+        bodies: Sequence[MovingBody] = (),
     ) -> Walls:
         """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
 
@@ -70,10 +74,12 @@ class Walls(eqx.Module):
             moving: parts of the walls that move along themselves; all others are at rest.
             layers: of ghosts; as many as fill the kernel's support if none is given. The paper's
                 three leave a particle beside the wall a support that is not full.
+            bodies: that are moved through that region. Where one meets a fixed wall it must reach
+                the kernel's support deep into the region, and should stay that far in.
 
         Raises:
-            ValueError: for a gap in the walls, a wall too thin, or a moving part without a wall or
-                that does not move along it.
+            ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
+                that does not move along it, or a body without room in the region or too thin.
 
         Examples:
             >>> import jax.numpy as jnp
@@ -94,21 +100,14 @@ class Walls(eqx.Module):
         _refuse_gaps(distance, space)
         lattice = _extended_lattice(space, layers)
         depth = distance(lattice)
-        ghosts = lattice[(depth >= 0.0) & (depth < layers * space.spacing)]
-        if not len(ghosts):
+        thickness = layers * space.spacing
+        ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
+        if not len(ghosts) and not bodies:
             raise ValueError(
                 "walls: the region of fluid leaves no place for a wall; let the box be closed in "
                 "some direction, or the region smaller than the box."
             )
-        normal = -_in_blocks(_gradient, fluid_region, ghosts)
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        if not np.all(length > 0.5):
-            where = ghosts[int(np.argmin(length))]
-            raise ValueError(
-                f"walls: the signed distance has no slope at {_at(where)}; its gradient must point "
-                "away from the fluid everywhere in the wall."
-            )
-        normal = normal / length
+        normal = _normals(fluid_region, ghosts)
         depth = distance(ghosts)[:, None]
         _refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
         velocity = np.zeros_like(ghosts)
@@ -127,11 +126,45 @@ class Walls(eqx.Module):
                     f"moving wall: the velocity of {lid.part} is across the wall; walls slide "
                     "along themselves only."
                 )
-        return cls(jnp.asarray(ghosts), jnp.asarray(normal), jnp.asarray(velocity), fluid_region)
+        here = [jnp.asarray(a) for a in (ghosts, normal, velocity)]
+        if not bodies:
+            return cls(*here, fluid_region)
+        position, normal, owner = _body_ghosts(fluid_region, bodies, space, thickness)
+        owner = jnp.concatenate([jnp.full(len(ghosts), len(bodies)), jnp.asarray(owner)])
+        moved = Bodies.at_start(bodies, owner.astype(jnp.int32), space.box)
+        more = (position, normal, np.zeros_like(position))
+        here = [jnp.concatenate([a, jnp.asarray(b)]) for a, b in zip(here, more, strict=True)]
+        here[2] = here[2] + moved.of_ghosts(moved.velocity)
+        return cls(*here, fluid_region, moved)
+
+    @property
+    def start_region(self) -> Region:
+        """Where fluid may be at t = 0, outside the bodies."""
+        return _without(self.fluid_region, () if self.bodies is None else self.bodies.parts)
+
+    def at(self, time: Float[Array, ""]) -> Walls:
+        """The walls at a time [s]: their bodies' ghosts moved, and their velocities."""
+        if self.bodies is None:
+            return self
+        then = self.bodies.at(time)
+        return Walls(
+            self.position + then.of_ghosts(then.offset - self.bodies.offset),
+            self.normal,
+            self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity),
+            self.fluid_region,
+            then,
+        )
+
+    def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
+        """Distance [m] to the nearest wall, negative in the fluid; see `Region`."""
+        distance = self.fluid_region.signed_distance(position)
+        if self.bodies is None:
+            return distance
+        return jnp.maximum(distance, -self.bodies.signed_distance(position))
 
     def beyond(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
         """Which particles are inside a wall."""
-        return self.fluid_region.signed_distance(position) > 0.0
+        return self.signed_distance(position) > 0.0
 
     def put_inside(
         self, position: Float[Array, "particles dim"], margin: float
@@ -148,6 +181,57 @@ class Walls(eqx.Module):
             move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
             position = position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
         return position
+
+
+def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:
+    for body in bodies:
+        region = region & ~body.region
+    return region
+
+
+def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
+    """Unit normals towards the fluid."""
+    normal = -_in_blocks(_gradient, fluid_region, ghosts)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    if not np.all(length > 0.5):
+        where = ghosts[int(np.argmin(length))]
+        raise ValueError(
+            f"walls: the signed distance has no slope at {_at(where)}; its gradient must point "
+            "away from the fluid everywhere in the wall."
+        )
+    return normal / length
+
+
+def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Space, thickness):
+    """Places at t = 0, normals and owners of the ghosts of bodies in a region of fluid."""
+    lattice = Lattice().positions(space)
+    lattice = np.asarray(lattice)[_in_blocks(_distance, fluid_region, np.asarray(lattice)) < 0.0]
+    fixed = partial(_in_blocks, _distance, fluid_region)
+    wet = partial(_in_blocks, _distance, _without(fluid_region, bodies))
+    found, taken = [], np.zeros(len(lattice), bool)
+    for number, body in enumerate(bodies):
+        depth = -_in_blocks(_distance, body.region, lattice)
+        held = (depth >= 0.0) & (depth < thickness) & ~taken
+        taken |= depth >= 0.0
+        ghosts = lattice[held]
+        if not len(ghosts):
+            raise ValueError(
+                f"moving body: no ghost lies in {body.region}; it must be in the region of fluid, "
+                "and several spacings thick."
+            )
+        normal = _normals(~body.region, ghosts)
+        surface = ghosts + depth[held][:, None] * normal
+        _refuse_thin_walls(wet, space, surface, normal)
+        behind = np.asarray(space.box.wrap(jnp.asarray(surface - space.support * normal)))
+        shallow = (wet(surface + 0.5 * space.spacing * normal) < 0.0) & (fixed(behind) > 0.0)
+        if shallow.any():
+            raise ValueError(
+                f"moving body: at {_at(surface[int(np.argmax(shallow))])} a fixed wall is nearer "
+                f"behind its face than the kernel's support of {space.support:.3g} m; the fluid "
+                "would feel that wall. Make the body thicker or raise the resolution."
+            )
+        found.append((ghosts, normal, np.full(len(ghosts), number)))
+    return (np.concatenate(a) for a in zip(*found, strict=True))
 
 
 def fill(
@@ -183,7 +267,9 @@ def fill(
 def _in_blocks(function, region: Region, points: np.ndarray) -> np.ndarray:
     """`function(region, points)` on blocks of equal size, so that it is compiled once."""
     count = len(points)
-    padded = np.concatenate([points, np.repeat(points[-1:], -count % _POINTS, axis=0)])
+    filler = points[-1:] if count else np.zeros((1, points.shape[1]))
+    missing = -count % _POINTS if count else _POINTS
+    padded = np.concatenate([points, np.repeat(filler, missing, axis=0)])
     blocks = padded.reshape(-1, _POINTS, points.shape[1])
     return np.concatenate([np.asarray(function(region, jnp.asarray(b))) for b in blocks])[:count]
 

@@ -21,6 +21,7 @@ from jaxsph import (
 from jaxsph.scenes import Scene
 
 from ..field_advection import FieldAdvection
+from ..still_walls import check_still
 from .cloud import Cloud
 from .fixed_points import kept_effects, with_effects, with_viscosity
 from .log_density import from_log_density
@@ -50,8 +51,10 @@ class EulerianRates(eqx.Module):
         """Rates of a scene; its viscosity is a parameter of the call.
 
         Raises:
-            ValueError: if the box is too small for the kernel's support.
+            ValueError: if the box is too small for the kernel's support, or bodies are moved
+                through the fluid.
         """
+        check_still(scene)
         effects = (*kept_effects(scene.effects), FieldAdvection())
         functional = with_effects(scene.functional(), effects)
         return cls._of(functional, jnp.asarray(points, scene.state.position.dtype))

@@ -19,6 +19,8 @@ from jaxsph.effects import (
 )
 from jaxsph.scenes import Scene
 
+from ..still_walls import check_still
+
 # what keeps particles evenly spread has nothing to do on fixed points
 _OF_PARTICLES = (ParticleShifting, ShiftingTransport, WallRepulsion)
 _ROUND_OFF = 1e3  # times the precision: a force that changes by less is steady
@@ -52,7 +54,9 @@ def with_viscosity(functional: SPHFunctional, viscosity: Float[Array, ""]) -> SP
 
 
 def check_steady(scene: Scene, points: Float[Array, "points dim"]) -> None:
-    """A ValueError if a force changes with time at the points (G, n) [m] during the scene's run."""
+    """A ValueError if a force changes with time at the points (G, n) [m] during the scene's run, or
+    its walls do."""
+    check_still(scene)
     force = changing_force(scene, points)
     if force is not None:
         raise ValueError(

@@ -55,6 +55,10 @@ def test_a_step_limit_is_the_least_of_sound_viscosity_and_force(scene):
     speed = float(jnp.linalg.norm(scene.state.velocity, axis=1).max())
     none = jnp.zeros(())
     assert float(model.step_limit(scene.state, none)) == pytest.approx(CFL * h / (c0 + speed))
+    fast = eqx.tree_at(lambda s: s.velocity, scene.state, scene.state.velocity.at[0, 0].set(5.0))
+    assert float(model.step_limit(fast, none)) == pytest.approx(
+        0.4 * model.search.skin / np.hypot(5.0, float(scene.state.velocity[0, 1]))
+    )  # it would outrun the list
     forced = float(model.step_limit(scene.state, jnp.asarray(1e6)))
     assert forced == pytest.approx(0.25 * (h / 1e6) ** 0.5)
     thick = taylor_green(16, reynolds=1.0, time_step=1e-3, arrangement=Lattice())

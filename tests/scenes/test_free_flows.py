@@ -35,7 +35,13 @@ from jaxsph.scenes.record import scene_from_record
 from jaxsph.scenes.rotating_square_patch import patch_pressure
 from jaxsph.scenes.standing_wave import FREQUENCY
 
-SMALL = {"couette": 25, "poiseuille": 25, "dam-break": 50, "open-cavity": None}
+SMALL = {
+    "couette": 25,
+    "poiseuille": 25,
+    "dam-break": 50,
+    "open-cavity": None,
+    "piston-wave-maker": 60,
+}
 EFFECTS = {
     name
     for name, kind in vars(all_effects).items()
@@ -76,7 +82,7 @@ def test_a_scene_compiles_to_the_same_program_without_the_files_of_other_effects
         "effects": ["free_surface", "surface_shifting", "surface_diffusion", "surface_tension",
                     "tensile_control", "artificial_viscosity", "background_pressure"],
         "scenes": ["dam_break", "elliptic_drop", "oscillating_drop", "rotating_square_patch",
-                   "standing_wave", "shear_layer", "free_surface_flow"],
+                   "standing_wave", "piston_wave_maker", "shear_layer", "free_surface_flow"],
     }  # fmt: skip
     for folder, names in gone.items():
         init = package / folder / "__init__.py"
@@ -220,7 +226,15 @@ def test_settings_out_of_range_are_named(make, options, message):
 
 
 @pytest.mark.parametrize(
-    "name", ["dam-break", "standing-wave", "oscillating-drop", "elliptic-drop", "shear-layer"]
+    "name",
+    [
+        "dam-break",
+        "standing-wave",
+        "piston-wave-maker",
+        "oscillating-drop",
+        "elliptic-drop",
+        "shear-layer",
+    ],
 )
 def test_a_scene_is_made_again_from_its_record(name):
     scene = small(name)
