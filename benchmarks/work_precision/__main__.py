@@ -129,6 +129,7 @@ def run_scene(
         tell(f"{name}: all done before")
     with progress(name, len(grid.settings), len(grid.settings) - len(left)) as report:
         for setting in left:
+            jax.clear_caches()  # each compiles its own; a process has room for so many programs
             rows.append(measured(name, grid.case, setting, folder))
             results["environment"] = environment()
             write_json(path, results)
