@@ -92,9 +92,10 @@ def near_walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     A particle counts as stuck if it stays nearer than 0.25 dx to a wall for `_STUCK` seconds. (That
     none is beyond a wall is checked after every step of the run.)
     """
-    region, dx = scene.walls.fluid_region, scene.space.spacing
-    distance = jax.jit(lambda x: -region.signed_distance(x) / dx)
-    over_dx = np.stack([np.asarray(distance(jnp.asarray(x))) for x in trajectory.position])
+    walls, dx = scene.walls, scene.space.spacing
+    distance = jax.jit(lambda t, x: -walls.at(t).signed_distance(x) / dx)
+    snapshots = zip(trajectory.time, trajectory.position, strict=True)
+    over_dx = np.stack([distance(jnp.asarray(t, x.dtype), jnp.asarray(x)) for t, x in snapshots])
     near = over_dx < 0.25
     longest, lasting = np.zeros(near.shape[1], int), np.zeros(near.shape[1], int)
     for row in near:

@@ -42,6 +42,7 @@ def test_the_piston_starts_without_a_jerk():
     assert float(jnp.abs(jnp.diff(acceleration)).max()) < 0.05 * largest  # 2 pi / 240 and the ramp
 
 
+@pytest.mark.slow  # half a minute; benchmarks.free_flows measures it too
 def test_the_wave_is_as_high_as_linear_theory_says():
     """The first harmonic of the surface in the fourth period, before the far wall is felt."""
     scene = piston_wave_maker(end_time=3.5 * PERIOD)

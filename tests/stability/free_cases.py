@@ -8,12 +8,13 @@ from jaxsph.scenes import (
     dam_break,
     gresho_vortex,
     oscillating_drop,
+    piston_wave_maker,
     rotating_square_patch,
     shear_layer,
     standing_wave,
 )
 
-from .bounds import LAYER, PATCH, POOL, SPLASH, TENSION_DROP, UNRESOLVED
+from .bounds import LAYER, PATCH, POOL, PUSHED, SPLASH, TENSION_DROP, UNRESOLVED
 from .full_cases import interval
 from .judge import Case, Run
 
@@ -33,6 +34,8 @@ FREE = (
     _case("dam-break/impact", "a = 10 dx, to t (2 g / a)^1/2 = 5.9, past the impact",
           SPLASH, dam_break, 50, 0.32),
     _case("dam-break/impact-long", "a = 30 dx, the same", SPLASH, dam_break, 150, 0.32, slow=True),
+    _case("piston/waves", "2 periods of a piston wave maker, water 7 dx deep",
+          PUSHED, piston_wave_maker, 80, 2.4),
     _case("patch/turn", "16 dx wide, omega t = 2: tension in the middle, arms grow",
           PATCH, rotating_square_patch, 16, 2.0),
     _case("patch/turn-long", "50 dx wide, omega t = 4", PATCH, rotating_square_patch, 50, 4.0,
