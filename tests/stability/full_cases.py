@@ -20,7 +20,12 @@ from .bounds import CAVITY, CHANNEL, TANK, VORTEX
 from .judge import Case, Ending, Run
 
 _SOUND_SPEED = 10.0  # m/s, of all scenes here at Ma = 0.1 and U = 1 m/s
-_STEP_TOO_LONG = (
+_STEP_TOO__STICKS = (
+    "where the pressure is negative single pairs of particles come nearer than 0.2 dx; a "
+    "background pressure prevents it, as taylor-green/from-jittered-re-1e6-evened shows"
+)
+
+LONG = (
     FaultCode.NOT_FINITE,
     FaultCode.DENSITY_OUT_OF_BOUNDS,
     FaultCode.NEIGHBORS_OUTDATED,
@@ -93,11 +98,13 @@ def _beyond_cavity(courant: float) -> Run:
 
 def _vortex_case(
     name: str, what: str, resolution=24, reynolds=100.0, end_time=2.0, arrangement=None,
-    precision="float64", slow=False,
+    precision="float64", slow=False, wrong="",
 ) -> Case:  # fmt: skip
     arrangement = Packed() if arrangement is None else arrangement
     make = partial(_vortex, resolution, reynolds, end_time, arrangement, precision)
-    return Case(f"taylor-green/{name}", what, make, VORTEX, slow=slow, precision=precision)
+    return Case(
+        f"taylor-green/{name}", what, make, VORTEX, slow=slow, precision=precision, wrong=wrong
+    )
 
 
 def _cavity_case(name, what, resolution, reynolds, end_time, precision="float64", slow=False):
@@ -121,7 +128,8 @@ LONG = (
     *(_vortex_case(f"from-{n}", f"started on the {n} arrangement, 24 x 24, 2 s", arrangement=a,
                    slow=n != "lattice") for n, a in _ARRANGEMENTS),
     *(_vortex_case(f"from-{n}-re-1e6", f"Re = 1e6 from the {n} arrangement, 64 x 64, 10 s",
-                   64, 1e6, 10.0, a, slow=True) for n, a in _ARRANGEMENTS),
+                   64, 1e6, 10.0, a, slow=True, wrong=_STICKS if n == "jittered" else "")
+      for n, a in _ARRANGEMENTS),
     Case("taylor-green/from-jittered-re-1e6-evened", "the same under a background pressure",
          partial(_evened, 64, 1e6, 10.0, JitteredLattice()), VORTEX, slow=True),
     _vortex_case("float32", "single precision, Re = 1e4, 24 x 24, 3 s",
