@@ -20,12 +20,7 @@ from .bounds import CAVITY, CHANNEL, TANK, VORTEX
 from .judge import Case, Ending, Run
 
 _SOUND_SPEED = 10.0  # m/s, of all scenes here at Ma = 0.1 and U = 1 m/s
-_STEP_TOO__STICKS = (
-    "where the pressure is negative single pairs of particles come nearer than 0.2 dx; a "
-    "background pressure prevents it, as taylor-green/from-jittered-re-1e6-evened shows"
-)
-
-LONG = (
+_STEP_TOO_LONG = (
     FaultCode.NOT_FINITE,
     FaultCode.DENSITY_OUT_OF_BOUNDS,
     FaultCode.NEIGHBORS_OUTDATED,
@@ -119,6 +114,11 @@ def _tank_case(name, what, resolution, end_time, precision="float64", slow=False
 
 _RE = ((1e3, "1e3"), (1e4, "1e4"), (1e6, "1e6"))
 _ARRANGEMENTS = (("lattice", Lattice()), ("packed", Packed()), ("jittered", JitteredLattice()))
+
+_STICKS = (
+    "where the pressure is negative single pairs of particles come nearer than 0.2 dx; a "
+    "background pressure prevents it, as taylor-green/from-jittered-re-1e6-evened shows"
+)
 
 LONG = (
     *(_vortex_case(f"re-{n}", f"Re = {n}, 32 x 32, 5 s: several turns after the laminar time",
