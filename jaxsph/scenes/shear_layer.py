@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import jax.numpy as jnp
 
 from ..arrangements import Arrangement
@@ -19,8 +21,6 @@ SCALES = {
     "paper": Scale(resolution=256, h_over_dx=2.0, time_step=6.25e-4, steps_per_snapshot=40),
 }
 KICK = 0.05  # m/s, the cross flow that sets the layers rolling
-REFERENCE_DENSITY = 1000.0  # kg/m^3
-BACKGROUND_PRESSURE = 4.0 * REFERENCE_DENSITY  # Pa, with U = 1 m/s
 
 
 def shear_layer(
@@ -28,6 +28,7 @@ def shear_layer(
     reynolds: float = 10_000.0,
     *,
     thickness: float = 1.0 / 30.0,
+    background_pressure: float = 0.0,
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -44,13 +45,16 @@ def shear_layer(
     Re = U L / nu, U = 1 m/s, L = 1 m, rho0 = 1000 kg/m^3. With d = 1/30 m each layer rolls into
     one vortex; with d = 1/80 m schemes without enough resolution make up more of them.
 
-    A background pressure of 4 rho0 U^2 keeps the vortices' cores, whose pressure sinks by up to
-    4 rho0 U^2, from negative pressure, where particles would clump.
+    The pressure in the vortices' cores sinks by rho0 U^2 and more. Where the layers are thin and
+    the viscosity small, particles clump there, unless a background pressure of 2 rho0 U^2 or so
+    evens them out. It costs accuracy elsewhere: with d = 1/30 m, Re = 1e4 and 48 x 48 particles
+    4.2 percent of the kinetic energy are lost in 1 s, 2.5 percent without.
 
     Args:
         resolution: particles per side; overrides the scale's, time step scaled along.
         reynolds: Reynolds number.
         thickness: d [m].
+        background_pressure: p_b [Pa]; rho0 U^2 is 1000 Pa.
         scale: `small` (64 x 64), `half` (128 x 128) or `paper` (256 x 256).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -61,9 +65,14 @@ def shear_layer(
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
-        ValueError: for a Reynolds number, thickness, resolution or step out of range.
+        ValueError: for a Reynolds number, thickness, background pressure, resolution or step out of
+            range.
     """
     positive(reynolds=reynolds, thickness=thickness, **{"t-end": end_time})
+    if not 0.0 <= background_pressure < math.inf:
+        raise ValueError(
+            f"background_pressure: must be zero or positive, got {background_pressure:g} Pa."
+        )
 
     def velocity(position):
         x, y = position[:, 0], position[:, 1]
@@ -72,21 +81,29 @@ def shear_layer(
         )
         return jnp.stack([along, KICK * jnp.sin(2.0 * jnp.pi * x)], axis=1)
 
+    def effects(dtype):
+        listed = delta_plus(dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)))
+        if background_pressure == 0.0:
+            return listed
+        return (*listed, BackgroundPressure(jnp.asarray(background_pressure, dtype)))
+
     return composed(
         "shear-layer",
-        effects=lambda dtype: (
-            *delta_plus(dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype))),
-            BackgroundPressure(jnp.asarray(BACKGROUND_PRESSURE, dtype)),
-        ),
+        effects=effects,
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
-        reference_density=REFERENCE_DENSITY,
+        reference_density=1000.0,
         reference_speed=1.0,
         mach=mach,
         velocity=velocity,
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds, "thickness": thickness},
+        parameters={
+            "scale": scale,
+            "reynolds": reynolds,
+            "thickness": thickness,
+            "background_pressure": background_pressure,
+        },
     )

@@ -113,7 +113,7 @@ def _print_untrained(found: Advice) -> None:
 def _machine(table: dict[str, Any]) -> str:
     machine = table["machine"]
     return (
-        f"{machine['processor']}, {machine['cores']} cores, {machine['system']}, "
+        f"{machine['processor']}, cores used: {machine['cores']}, {machine['system']}, "
         f"jaxsph {table['versions']['jaxsph']}, jax {table['versions']['jax']}"
     )
 

@@ -216,6 +216,7 @@ def test_periodic_flows_lose_energy_and_keep_momentum(make):
         (oscillating_drop, {"amplitude": 0.5}, "amplitude"),
         (elliptic_drop, {"pull": -1.0}, "pull"),
         (shear_layer, {"thickness": 0.0}, "thickness"),
+        (shear_layer, {"background_pressure": -1.0}, "background_pressure"),
         (gresho_vortex, {"scale": "tiny"}, "scale"),
         (rotating_square_patch, {"end_time": -1.0}, "t-end"),
     ],
