@@ -86,7 +86,7 @@ def test_an_answer_from_one_line(table, tmp_path, capsys):
     line = ["advise", "taylor-green", "--table", str(table), "--json", str(path)]
     assert main([*line, "--velocity-error", "9%", "--pressure-error", "50%"]) == 0
     shown = capsys.readouterr().out
-    assert "run reduced" in shown and "An abacus, 2 cores" in shown
+    assert "run reduced" in shown and "An abacus, cores used: 2" in shown
     assert "paid back after 100 runs" in shown and "the exact solution" in shown
     written = json.loads(path.read_text())
     assert written["best"]["label"] == "reduced" and written["reached"]
