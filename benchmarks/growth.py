@@ -65,11 +65,11 @@ CURVES = {  # label, colour, marker
     (GRADIENT, GRADIENT): ("full model, run and its gradient", style.PURPLE, "P"),
 }
 PANELS = (  # quantity, axis labels, families, each with the one whose curves it shares
-    ("seconds", "particles", "time [s]", {FULL: FULL, MOVING: MOVING}),
+    ("processor seconds", "particles", "processor time [s]", {FULL: FULL, MOVING: MOVING}),
     ("peak memory", "particles", "peak memory above start [GiB]", {FULL: FULL, MOVING: MOVING}),
-    ("seconds", "neighbours of a particle", "time [s]", {NEIGHBORS: FULL}),
-    ("seconds", "modes", "time [s]", {MOVING_MODES: MOVING, TENSORS: TENSORS}),
-    ("seconds", "steps", "time [s]", {GRADIENT: GRADIENT}),
+    ("processor seconds", "neighbours of a particle", "processor time [s]", {NEIGHBORS: FULL}),
+    ("processor seconds", "modes", "processor time [s]", {MOVING_MODES: MOVING, TENSORS: TENSORS}),
+    ("processor seconds", "steps", "processor time [s]", {GRADIENT: GRADIENT}),
     ("temporary memory", "steps", "memory of the program [GiB]", {GRADIENT: GRADIENT}),
 )
 PLAN = ((1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6), (5, 10, 20, 40), (10, 20, 40, 80, 160, 320))

@@ -113,6 +113,7 @@ def figure(scene: str, rows: Sequence[dict[str, Any]], case: Mapping[str, Any], 
     made = sheet(12, 5.2)
     made.suptitle(f"{scene}, Re = {case['reynolds']:g}", color=INK, fontsize=11)
     handles: dict[str, Any] = {}
+    named: list[tuple[Any, ...]] = []
     for axes, measure in zip(made.subplots(1, 2), (VELOCITY, PRESSURE), strict=True):
         dress(axes, "run time [s]", "relative L2 error [%]", titles[measure])
         axes.set(xscale="log", yscale="log")
@@ -139,8 +140,10 @@ def figure(scene: str, rows: Sequence[dict[str, Any]], case: Mapping[str, Any], 
                     label=family,
                 )  # fmt: skip
         axes.margins(x=0.12, y=0.1)
-        _write_labels(axes, kept, points)
+        named.append((axes, kept, points))
     legend_below(made, list(handles.values()))
+    for panel in named:  # once the sheet has its size
+        _write_labels(*panel)
     return save(made, path)
 
 
