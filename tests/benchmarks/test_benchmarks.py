@@ -269,6 +269,7 @@ def test_inner_products_are_taken_up_again(tmp_path, capsys):
     assert "other settings" in capsys.readouterr().err
 
 
+@pytest.mark.slow  # half a minute; no library code of its own
 def test_beyond_the_time_trained_on(tmp_path, capsys):
     path = tmp_path / "extrapolation.json"
     small = ["--resolution", "16", "--predict", "125", "--modes", "3", "--iterations", "20"]

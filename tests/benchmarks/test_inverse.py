@@ -39,6 +39,7 @@ def test_a_lid_for_a_wanted_line():
     assert found["line_error_percent"] < 0.7 * found["line_error_at_start_percent"]
 
 
+@pytest.mark.slow  # notebook 10 is the same
 def test_memory_length_and_closure():
     found = memory_and_closure.solve(side=16, modes=3, end_time=0.08, steps=4, iterations=60)
     assert found["tau"]["losses"][-1] < found["tau"]["losses"][0]
