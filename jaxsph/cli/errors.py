@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import warnings
 from typing import NoReturn
 
 
@@ -17,8 +18,11 @@ class Parser(argparse.ArgumentParser):
 def report_errors(program: str, command, *arguments) -> int:
     """Run a command; what is wrong with its input becomes one line on stderr and code 2.
 
-    A disk that fails in mid-run gives code 1.
+    A disk that fails in mid-run gives code 1. Warnings are a line each, without the place in the
+    code that users of a command did not write.
     """
+    usual = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"{program}: warning: {_line(message)}\n"
     try:
         return command(*arguments)
     except MemoryError:
@@ -27,9 +31,15 @@ def report_errors(program: str, command, *arguments) -> int:
         return fail(program, str(error), 2)
     except OSError as error:
         return fail(program, f"{error}; choose another place.", 1)
+    finally:
+        warnings.formatwarning = usual
 
 
 def fail(program: str, message: str, code: int) -> int:
     """Print an error as one line on stderr; the exit code is handed back."""
-    print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"{program}: error: {_line(message)}", file=sys.stderr)
     return code
+
+
+def _line(text) -> str:
+    return " ".join(str(text).split())
