@@ -14,7 +14,16 @@ from jaxsph.scenes import (
     standing_wave,
 )
 
-from .bounds import LAYER, PATCH, POOL, PUSHED, SPLASH, TENSION_DROP, UNRESOLVED
+from .bounds import (
+    LAYER,
+    PATCH,
+    POOL,
+    PUSHED,
+    SPLASH,
+    TENSION_DROP,
+    THIN_LAYER,
+    UNRESOLVED,
+)
 from .full_cases import interval
 from .judge import Case, Run
 
@@ -45,7 +54,7 @@ FREE = (
     _case("shear-layer/unresolved", "layers of 1/80 m, 0.4 dx, on 32 x 32, Re = 1e4, 1 s",
           UNRESOLVED, shear_layer, 32, 1.0, thickness=_THIN),
     _case("shear-layer/thin-long", "layers of 1/80 m on 128 x 128, Re = 1e6, under 4 rho0 U^2, 2 s",
-          LAYER, shear_layer, 128, 2.0, thickness=_THIN, reynolds=1e6,
+          THIN_LAYER, shear_layer, 128, 2.0, thickness=_THIN, reynolds=1e6,
           background_pressure=4000.0, slow=True),
     _case("gresho/inviscid", "32 x 32, without viscosity, 2 s", LAYER, gresho_vortex, 32, 2.0),
     _case("standing-wave/long", "40 dx long, 12 s", POOL, standing_wave, 40, 12.0, slow=True),
