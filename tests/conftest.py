@@ -1,10 +1,6 @@
 """Every test runs in double precision and without silent dtype or rank promotion."""
 
-import os
 from pathlib import Path
-
-# most of the time goes into compiling small programs; this is 8 percent less of it. Before jax.
-os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1")
 
 import hypothesis
 import jax

@@ -23,7 +23,7 @@ class Row:
         velocity_percent: relative L2 error of the velocity, largest over time [%].
         pressure_percent: that of the pressure, median over time [%].
         seconds: of a run, without compilation.
-        compile_seconds: of its compilation.
+        compile_seconds: of its compilation; None if its program was compiled before.
         offline_seconds: before the first run, training runs included; None for a full model.
         command: that runs it.
     """
@@ -33,7 +33,7 @@ class Row:
     velocity_percent: float
     pressure_percent: float
     seconds: float
-    compile_seconds: float
+    compile_seconds: float | None
     offline_seconds: float | None
     command: str
 

@@ -94,7 +94,7 @@ def _cells(row: Row) -> dict[str, str]:
         "setting": row.label,
         "velocity error": f"{row.velocity_percent:.3g} %",
         "pressure error": f"{row.pressure_percent:.3g} %",
-        "run": f"{row.seconds:.3g} s, and {row.compile_seconds:.2g} s to compile",
+        "run": f"{row.seconds:.3g} s{_compilation(row)}",
     }
     if row.offline_seconds is not None:
         cells["training before"] = f"{row.offline_seconds:.3g} s"
@@ -108,6 +108,12 @@ def _print_untrained(found: Advice) -> None:
     print_rows({"command": full.command.replace("\n", "; ")})
     if runs is not None:
         print(f"The reduced model's training is paid back after {runs} run{'s' * (runs != 1)}.")
+
+
+def _compilation(row) -> str:
+    """What compiling takes, where that was measured by itself."""
+    seconds = row.compile_seconds
+    return "" if seconds is None else f", and {seconds:.2g} s to compile"
 
 
 def _machine(table: dict[str, Any]) -> str:

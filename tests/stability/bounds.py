@@ -111,16 +111,9 @@ JOLT = Bound(
     "a layer thinner than a spacing starts as a jump of 2 U between rows, whose sound is loud",
 )  # fmt: skip
 
-CORES = Bound(
-    "density", density_deviation, 0.05,
-    "thin layers roll up into vortices of up to 1.65 U; the core of a Lamb-Oseen vortex of that "
-    "peak speed lies 1.7 rho0 (1.65 U)^2 below, 0.046",
-)  # fmt: skip
-
 SPLASH = (LOOSE_DENSITY, FALL, JET, WALLS)
 PATCH = (DENSITY, DECAY)
 LAYER = (DENSITY, DECAY, MOMENTUM, DISTANCE, EVEN)
-THIN_LAYER = (CORES, DECAY, MOMENTUM, DISTANCE, EVEN)
 UNRESOLVED = (JOLT, DECAY, MOMENTUM, EVEN)
 PUSHED = (DENSITY, WALLS, DISTANCE, EVEN)
 POOL = (DENSITY, WAVE, WALLS, DISTANCE, EVEN)
