@@ -25,7 +25,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import run_scene
+from jaxsph import COMPILER_OPTIONS, run_scene
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.cli import positive_int, report_errors
 from jaxsph.environment import environment
@@ -232,7 +232,7 @@ def cost(flow: Flow, steps: int, repeats: int) -> dict[str, Any]:
         "run": partial(flow.final, steps=steps),
         "gradient": jax.grad(partial(flow.final, steps=steps), has_aux=True),
     }.items():
-        program = jax.jit(function).lower(base).compile()
+        program = jax.jit(function).lower(base).compile(COMPILER_OPTIONS)
         memory = program.memory_analysis()
         row[f"{name}_mebibytes"] = memory.temp_size_in_bytes / 2**20
         calls[name] = partial(lambda p: jax.block_until_ready(p(base)), program)

@@ -27,6 +27,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxsph import COMPILER_OPTIONS
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.cli import fail, positive_int, report_errors
 from jaxsph.environment import environment
@@ -176,7 +177,7 @@ class _Meter:
     def first(self, name: str, function: Callable, *arguments, steps: int = 1) -> Any:
         """The result of the first call; how long it took to compile, and what memory it needs."""
         start = clock.perf_counter()
-        program = jax.jit(function).lower(*arguments).compile()
+        program = jax.jit(function).lower(*arguments).compile(COMPILER_OPTIONS)
         compiled = clock.perf_counter()
         self.calls[name] = lambda: jax.block_until_ready(program(*arguments))
         result = self.calls[name]()

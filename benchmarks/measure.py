@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from tqdm import tqdm
 
-from jaxsph import Trajectory
+from jaxsph import COMPILER_OPTIONS, Trajectory
 from jaxsph.pairs import Space
 from jaxsph.scenes import Scene
 from jaxsph_rom.report.plain import plain
@@ -39,7 +39,7 @@ def summary(seconds: list[float]) -> dict[str, float | int | None]:
 def compiled(function: Callable, *arguments) -> tuple[Callable[[], Any], float]:
     """A call of the compiled function that blocks on its result, and its compile time [s]."""
     start = clock.perf_counter()
-    program = jax.jit(function).lower(*arguments).compile()
+    program = jax.jit(function).lower(*arguments).compile(COMPILER_OPTIONS)
     seconds = clock.perf_counter() - start
     return lambda: jax.block_until_ready(program(*arguments)), seconds
 

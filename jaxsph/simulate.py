@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 import equinox as eqx
@@ -12,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .compiler_options import COMPILER_OPTIONS
 from .integrate import (
     Fault,
     FaultCode,
@@ -32,7 +34,7 @@ class Recorder(Protocol):
     def append(self, step: int, time: float, snapshot: Snapshot) -> None: ...
 
 
-@eqx.filter_jit
+@partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
 def _interval(model, state, first_step, time_step, steps, stepping):
     state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1, stepping)
     return state, fault, jax.tree.map(lambda a: a[0], snapshots)

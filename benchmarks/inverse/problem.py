@@ -12,7 +12,7 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float
 
-from jaxsph import FullModel, ParticleState, Snapshot
+from jaxsph import COMPILER_OPTIONS, FullModel, ParticleState, Snapshot
 from jaxsph.integrate import FaultCode, explanation, integrate
 from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.pairs import Space
@@ -117,7 +117,7 @@ def descend(
 
     parameters, state = start, optimiser.init(start)
     before = clock.perf_counter()
-    step_now = step.lower(parameters, state).compile()
+    step_now = step.lower(parameters, state).compile(COMPILER_OPTIONS)
     compile_seconds = clock.perf_counter() - before
     losses, history, evaluations = [], [start], 0
     before = clock.perf_counter()

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import ParticleState
+from jaxsph import COMPILER_OPTIONS, ParticleState
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import Continuity, IsotropicViscosity, PressureForce
 from jaxsph.environment import versions
@@ -42,14 +42,14 @@ class Ours(Side):
         state = self._scene.state
         functional = self._scene.functional()
         time = jnp.zeros((), state.density.dtype)
-        build = jax.jit(self._model.search.build).lower(state.position).compile()
+        build = jax.jit(self._model.search.build).lower(state.position).compile(COMPILER_OPTIONS)
         self._build = partial(build, state.position)
         neighbors = self._build()
         if bool(neighbors.overflow):
             raise ValueError("the neighbour list overflows.")
         arguments = (functional, state, neighbors)
-        compiled = jax.jit(lambda f, y, n: f(time, y, n)).lower(*arguments).compile()
-        self._call = partial(compiled, *arguments)
+        lowered = jax.jit(lambda f, y, n: f(time, y, n)).lower(*arguments)
+        self._call = partial(lowered.compile(COMPILER_OPTIONS), *arguments)
         return {
             "terms": [f"{e.name}: {TERMS[e.name]}" for e in self._scene.effects],
             "neighbor_search": "list with a Verlet skin, kept over steps; a right-hand side loops "
@@ -81,7 +81,8 @@ class Ours(Side):
 
     def _compile_run(self):
         self._state, self._step = self._scene.state, 0
-        run = eqx.filter_jit(partial(integrate, steps_per_snapshot=self._steps, snapshots=1))
+        run = partial(integrate, steps_per_snapshot=self._steps, snapshots=1)
+        run = eqx.filter_jit(run, compiler_options=COMPILER_OPTIONS)
         self._integrate = run.lower(self._model, self._state, np.int32(0), self._dt).compile()
 
     def _rehearsed(self):

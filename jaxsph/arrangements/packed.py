@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import final
 
 import equinox as eqx
@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from ..compiler_options import COMPILER_OPTIONS
 from ..full_model import refresh_list
 from ..neighbors import NeighborSearch
 from ..pairs import PairTerm, Space, pair_sum
@@ -89,7 +90,7 @@ class Packed(Arrangement):
             position = space.box.wrap(position + _STEP * dx * velocity)
             return position, velocity, neighbors, residual(force), count + 1
 
-        @eqx.filter_jit
+        @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
         def run(position):
             infinite = jnp.asarray(jnp.inf, position.dtype)
             carry = (position, jnp.zeros_like(position), search.build(position), infinite, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import final
 
 import equinox as eqx
@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from ..compiler_options import COMPILER_OPTIONS
 from ..effects.particle_shifting import shift_velocity, shifting_term
 from ..full_model import refresh_list
 from ..neighbors import NeighborSearch
@@ -93,7 +94,7 @@ def _stirred(arrangement: Stirred, space: Space, dtype):
         position = space.box.wrap(position + time_step * swirl(middle, space))
         return (position, neighbors, overflow | neighbors.overflow), None
 
-    @eqx.filter_jit
+    @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
     def run(position):
         carry = (position, search.build(position), jnp.zeros((), bool))
         return lax.scan(step, carry, None, length=steps)[0]

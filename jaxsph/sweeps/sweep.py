@@ -12,6 +12,7 @@ import numpy as np
 from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from ..compiler_options import COMPILER_OPTIONS
 from ..integrate import FaultCode, integrate
 from ..scenes import Scene
 from ..trajectory import Snapshot
@@ -127,6 +128,7 @@ def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
 
     spec = PartitionSpec(_AXIS)
     program = jax.jit(
-        jax.shard_map(share, mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False)
+        jax.shard_map(share, mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False),
+        compiler_options=COMPILER_OPTIONS,
     )
     return _Run(program, NamedSharding(mesh, spec), mesh.size * batch)
