@@ -36,10 +36,12 @@ def summary(seconds: list[float]) -> dict[str, float | int | None]:
     return {"median": middle, "min": min(seconds), "spread": spread, "repeats": len(seconds)}
 
 
-def compiled(function: Callable, *arguments) -> tuple[Callable[[], Any], float]:
+def compiled(
+    function: Callable, *arguments, options: dict[str, Any] | None = COMPILER_OPTIONS
+) -> tuple[Callable[[], Any], float]:
     """A call of the compiled function that blocks on its result, and its compile time [s]."""
     start = clock.perf_counter()
-    program = jax.jit(function).lower(*arguments).compile(COMPILER_OPTIONS)
+    program = jax.jit(function).lower(*arguments).compile(options)
     seconds = clock.perf_counter() - start
     return lambda: jax.block_until_ready(program(*arguments)), seconds
 

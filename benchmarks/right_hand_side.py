@@ -4,7 +4,7 @@
 
 The Taylor-Green scene on a jittered lattice, its own neighbour search and list. Times are medians
 over repeats in which the calls take turns; ns_per_pair counts the pairs that interact, not the
-slots of the list.
+slots of the list. `in order` is the right-hand side without `jaxsph.COMPILER_OPTIONS`.
 """
 
 from __future__ import annotations
@@ -101,6 +101,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     for name, (function, arguments) in _right_hand_sides(scene, neighbors).items():
         calls[name], compile_seconds[name] = compiled(function, *arguments)
         tell(f"{name}: compiled in {compile_seconds[name]:.1f} s")
+    value, arguments = _right_hand_sides(scene, neighbors)["primal"]
+    calls["in order"], compile_seconds["in order"] = compiled(value, *arguments, options=None)
     wall, busy = alternate(calls, options.repeats)
     times = {name: summary(seconds) for name, seconds in wall.items()}
     particles = scene.state.position.shape[0]
@@ -116,6 +118,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "ns_per_pair": 1e9 * primal["median"] / pairs,
         "ns_per_pair_min": 1e9 * primal["min"] / pairs,
         "cores_busy": sum(busy["primal"]) / sum(wall["primal"]),
+        "in_order_ratio": times["in order"]["median"] / primal["median"],
         "jvp_ratio": times["jvp"]["median"] / primal["median"],
         "vjp_ratio": times["vjp"]["median"] / primal["median"],
         "rebuild_seconds": rebuild["median"],
@@ -240,7 +243,7 @@ def _table(results: dict[str, Any]) -> str:
         f"{results['neighbors']:.0f} neighbours, {results['dtype']}, {results['device']}"
     )
     rows = []
-    for name in ("primal", "jvp", "vjp", "rebuild"):
+    for name in ("primal", "in order", "jvp", "vjp", "rebuild"):
         times = results["times"][name]
         rows.append((
             name,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from jax.extend.core import jaxprs_in_params
 
-from jaxsph import Box, PairTerm, Space, VerletList, effects, pair_sum
+from jaxsph import COMPILER_OPTIONS, Box, PairTerm, Space, VerletList, effects, pair_sum
 from jaxsph.kernels import QuinticSpline, WendlandC2, WendlandC4
 from jaxsph.pairs import pair_sum_p
 
@@ -153,6 +153,10 @@ def dense_sums(space, fields):
     return exact, {name: np.abs(s).sum(1).max() for name, s in summands.items()}
 
 
+def compiled(program):
+    return program.compile(COMPILER_OPTIONS)
+
+
 def check_sums(space, fields, neighbors, tolerance):
     found = sums_of(delta_plus_terms(space), fields, space, neighbors)
     exact, size = dense_sums(space, fields)
@@ -183,6 +187,32 @@ def test_equals_the_dense_sum_over_several_uneven_chunks():
     space = make_space(2, 35, h_over_dx=4.0)  # 1225 rows of about 220 slots: three chunks
     fields = make_fields(space)
     check_sums(space, fields, make_list(space, fields), 1e-12)  # round-off
+
+
+def test_compiler_options_change_a_sum_by_rounding_only():
+    space = make_space(2, 30)
+    fields = make_fields(space)
+    neighbors, terms = make_list(space, fields), delta_plus_terms(space)
+    program = jax.jit(lambda f, n: sums_of(terms, f, space, n)).lower(fields, neighbors)
+    _, size = dense_sums(space, fields)
+    in_order, found = program.compile()(fields, neighbors), compiled(program)(fields, neighbors)
+    assert any((found[name] != in_order[name]).any() for name in in_order)  # they do act
+    for name, value in in_order.items():
+        np.testing.assert_allclose(found[name], value, atol=1e-13 * size[name], err_msg=name)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_compiler_options_keep_what_is_not_finite(bad):
+    space = make_space(2, 20)
+    fields = make_fields(space)
+    neighbors = make_list(space, fields)
+    fields["density"] = fields["density"].at[7].set(bad)  # in a `where`, a NaN could be lost
+    terms = tuple(t for t in delta_plus_terms(space) if t.name == "diffusion_sum")
+    program = jax.jit(lambda f, n: sums_of(terms, f, space, n)).lower(fields, neighbors)
+    in_order, found = program.compile()(fields, neighbors), compiled(program)(fields, neighbors)
+    lost = ~np.isfinite(in_order["diffusion_sum"])
+    assert 10 < lost.sum() < 50  # those around it
+    np.testing.assert_array_equal(~np.isfinite(found["diffusion_sum"]), lost)
 
 
 def test_equal_terms_are_summed_once():

@@ -46,11 +46,14 @@ def test_right_hand_side(tmp_path, capsys):
     read = results(path)
     for key in (
         "seconds", "seconds_min", "pairs", "ns_per_pair", "ns_per_pair_min", "cores_busy",
-        "jvp_ratio", "vjp_ratio", "rebuild_seconds", "rebuild_share", "peak_memory_gib",
+        "jvp_ratio", "vjp_ratio", "in_order_ratio", "rebuild_seconds", "rebuild_share",
+        "peak_memory_gib",
     ):  # fmt: skip
         assert read[key] > 0, key
     assert read["seconds_spread"] >= 0 and 0 < read["rebuild_share"] < 1
-    assert read["compile_seconds"].keys() == {"primal", "jvp", "vjp", "rebuild"}
+    assert read["compile_seconds"].keys() == {
+        "primal", "in order", "jvp", "vjp", "rebuild",
+    }  # fmt: skip
     assert (read["particles"], read["dtype"], read["h_over_dx"]) == (144, "float32", 2.0)
     assert read["rebuild_steps"] == 4  # whole intervals of two steps
     assert 2 <= read["rebuilds"] <= 6  # at least at the start of each interval
