@@ -90,6 +90,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "end_time": options.end_time,
         "cores": cores(),
         "environment": environment(),
+        "xla_flags": os.environ.get("XLA_FLAGS", ""),  # of this library and of JAX-SPH
         "right_hand_sides": [],
         "runs": [],
         "equal_time": [],
