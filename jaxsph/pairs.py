@@ -27,7 +27,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
-from .chunks import chunked_map
+from .chunks import overlapping_map
 from .domain import Box
 from .kernels import Kernel
 from .neighbors import VerletList, WallPairs
@@ -290,7 +290,7 @@ def _evaluate(index, *columns, function, rows):
 
     chunk = max(1, _SLOTS_PER_CHUNK // index.shape[1])
     here = tuple(column[wanted] for column in columns)
-    return list(chunked_map(sums, (here, index[wanted]), chunk))
+    return list(overlapping_map(sums, (here, index[wanted]), chunk))
 
 
 def _abstract(index, *columns, function, rows):

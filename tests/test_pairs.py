@@ -11,6 +11,7 @@ import pytest
 from jax.extend.core import jaxprs_in_params
 
 from jaxsph import COMPILER_OPTIONS, Box, PairTerm, Space, VerletList, effects, pair_sum
+from jaxsph.chunks import chunked_map, overlapping_map
 from jaxsph.kernels import QuinticSpline, WendlandC2, WendlandC4
 from jaxsph.pairs import pair_sum_p
 
@@ -187,6 +188,21 @@ def test_equals_the_dense_sum_over_several_uneven_chunks():
     space = make_space(2, 35, h_over_dx=4.0)  # 1225 rows of about 220 slots: three chunks
     fields = make_fields(space)
     check_sums(space, fields, make_list(space, fields), 1e-12)  # round-off
+
+
+@pytest.mark.parametrize("rows", [1, 5, 16, 100, 1337, 2000, 2001])
+def test_maps_in_chunks_are_maps_of_all_rows(rows):
+    values = jnp.arange(2.0 * rows).reshape(rows, 2)
+
+    def function(block):
+        one, other = block
+        return jnp.sum(one, axis=1), other + 1
+
+    whole = function((values, jnp.arange(rows)))
+    for mapped in (chunked_map, overlapping_map):
+        for chunk in (1, 7, 8, 300, 5000):
+            found = mapped(function, (values, jnp.arange(rows)), chunk)
+            jax.tree.map(np.testing.assert_array_equal, found, whole)
 
 
 def test_compiler_options_change_a_sum_by_rounding_only():
