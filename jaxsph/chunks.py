@@ -11,28 +11,34 @@ _SHARES = 8  # sizes are multiples of it, for cores to share evenly: XLA's loop 
 
 
 def chunked_map(function, rows, chunk: int):
-    """`function` over the leading axis of the arrays `rows`, about `chunk` rows at a time at most.
+    """`function` over the leading axis of the arrays `rows`, at most `chunk` rows at a time.
 
-    `function` takes and returns arrays whose leading axis is the chunk's. Rows are padded with
-    zeros to whole chunks of equal size and the padding's results are dropped.
+    `function` takes and returns arrays whose leading axis is the chunk's. The last row is repeated
+    up to whole chunks of equal size, and what comes of that is dropped: such rows are as sound as
+    the others, derivatives included.
     """
-    total, count, size = _sizes(rows, chunk)
+    total = jax.tree.leaves(rows)[0].shape[0]
+    count = max(1, -(-total // chunk))
+    size = -(-total // count)
+    beyond = count * size - total
 
     def split(a):
-        padding = [(0, count * size - total)] + [(0, 0)] * (a.ndim - 1)
-        return jnp.pad(a, padding).reshape((count, size) + a.shape[1:])
+        a = jnp.concatenate([a, jnp.repeat(a[-1:], beyond, axis=0)]) if beyond else a
+        return a.reshape((count, size) + a.shape[1:])
 
     out = lax.map(function, jax.tree.map(split, rows))
     return jax.tree.map(lambda a: a.reshape((count * size,) + a.shape[2:])[:total], out)
 
 
 def overlapping_map(function, rows, chunk: int):
-    """The same without a padded copy of the rows: the last chunk begins where it still fits.
+    """The same without a copy of the rows: the last chunk begins where it still fits.
 
     Not for reverse mode, where every chunk would add to a cotangent of all rows.
     """
-    total, count, size = _sizes(rows, chunk)
-    size = min(size, total)
+    total = jax.tree.leaves(rows)[0].shape[0]
+    count = max(1, -(-total // chunk))
+    size = min(max(1, -(-total // (_SHARES * count))) * _SHARES, total)
+    count = max(1, -(-total // max(1, size)))
     starts = jnp.minimum(size * jnp.arange(count, dtype=jnp.int32), total - size)
 
     def one(start):
@@ -43,11 +49,3 @@ def overlapping_map(function, rows, chunk: int):
         return jnp.concatenate([before, a[-1, count * size - total :]])
 
     return jax.tree.map(joined, lax.map(one, starts))
-
-
-def _sizes(rows, chunk: int) -> tuple[int, int, int]:
-    """Rows, chunks, and rows of a chunk."""
-    total = jax.tree.leaves(rows)[0].shape[0]
-    count = max(1, -(-total // chunk))
-    size = max(1, -(-total // (_SHARES * count))) * _SHARES
-    return total, max(1, -(-total // size)), size

@@ -205,6 +205,14 @@ def test_maps_in_chunks_are_maps_of_all_rows(rows):
             jax.tree.map(np.testing.assert_array_equal, found, whole)
 
 
+def test_rows_beyond_the_last_have_a_derivative():
+    def total(values):
+        return jnp.sum(chunked_map(jnp.sqrt, values, 4))  # its derivative at zero is infinite
+
+    values = jnp.arange(1.0, 8.0)  # seven rows in two chunks
+    np.testing.assert_allclose(jax.grad(total)(values), 0.5 / np.sqrt(values))
+
+
 def test_compiler_options_change_a_sum_by_rounding_only():
     space = make_space(2, 30)
     fields = make_fields(space)

@@ -137,13 +137,15 @@ def some_modes(scene, count=4):
     return columns.reshape(len(x), 3, count)
 
 
-def test_petrov_galerkin_without_memory_is_galerkin_to_the_last_bit(scene, disturbed):
+def test_petrov_galerkin_without_memory_is_galerkin(scene, disturbed):
     modes = some_modes(scene)
     results = []
     for projection in (Galerkin(), AdjointPetrovGalerkin(0.0)):
         model = reduced(scene, modes, projection, Energy())
         results.append(rates(model, eqx.filter_jit(model.project)(disturbed)))
-    np.testing.assert_array_equal(results[0].coordinates, results[1].coordinates)
+    # to round-off: the second program takes a Jacobian too, and XLA may round elsewhere in it
+    size = np.abs(results[0].coordinates).max()
+    np.testing.assert_allclose(*(r.coordinates for r in results), rtol=0.0, atol=1e-14 * size)
     np.testing.assert_array_equal(results[0].position, results[1].position)
 
 
