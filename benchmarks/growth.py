@@ -5,9 +5,8 @@
 The Taylor-Green vortex from a jittered lattice, float64: the full model, the reduced model on
 moving particles (local splines, Galerkin), the tensors, and gradients through the loop. A step is
 one of five that `integrate` makes in one call, as in a run: neighbour lists are built anew when
-they are due, and memory is taken once. A list or a right-hand side alone is a call of its own, and
-where it needs more than some 30 MB the system clears that memory anew for each. Every case is
-measured in a process of its own, as the peak of memory only grows.
+they are due, and memory is taken once; a list or a right-hand side alone takes it in every call.
+Every case is measured in a process of its own, as the peak of memory only grows.
 Finished cases are kept in the JSON file: the same command goes on.
 """
 

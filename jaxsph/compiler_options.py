@@ -12,5 +12,5 @@ COMPILER_OPTIONS = {
 XLA adds up the terms of a sum in their order, one after another; with these it may add several
 lanes at once, and a pair sum takes half the time on a CPU (`benchmarks.right_hand_side`). Results
 differ by rounding. A NaN stays a NaN, infinities and divisions are as always. `simulate` and
-`sweep` compile with them; a program of your own does if you say so. Other devices ignore them.
+`sweep` compile with them; a program of your own does if you say so. All are options of the CPU.
 """

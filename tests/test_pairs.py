@@ -11,7 +11,6 @@ import pytest
 from jax.extend.core import jaxprs_in_params
 
 from jaxsph import COMPILER_OPTIONS, Box, PairTerm, Space, VerletList, effects, pair_sum
-from jaxsph.chunks import chunked_map, overlapping_map
 from jaxsph.kernels import QuinticSpline, WendlandC2, WendlandC4
 from jaxsph.pairs import pair_sum_p
 
@@ -154,10 +153,6 @@ def dense_sums(space, fields):
     return exact, {name: np.abs(s).sum(1).max() for name, s in summands.items()}
 
 
-def compiled(program):
-    return program.compile(COMPILER_OPTIONS)
-
-
 def check_sums(space, fields, neighbors, tolerance):
     found = sums_of(delta_plus_terms(space), fields, space, neighbors)
     exact, size = dense_sums(space, fields)
@@ -190,36 +185,14 @@ def test_equals_the_dense_sum_over_several_uneven_chunks():
     check_sums(space, fields, make_list(space, fields), 1e-12)  # round-off
 
 
-@pytest.mark.parametrize("rows", [1, 5, 16, 100, 1337, 2000, 2001])
-def test_maps_in_chunks_are_maps_of_all_rows(rows):
-    values = jnp.arange(2.0 * rows).reshape(rows, 2)
-
-    def function(block):
-        one, other = block
-        return jnp.sum(one, axis=1), other + 1
-
-    whole = function((values, jnp.arange(rows)))
-    for mapped in (chunked_map, overlapping_map):
-        for chunk in (1, 7, 8, 300, 5000):
-            found = mapped(function, (values, jnp.arange(rows)), chunk)
-            jax.tree.map(np.testing.assert_array_equal, found, whole)
-
-
-def test_rows_beyond_the_last_have_a_derivative():
-    def total(values):
-        return jnp.sum(chunked_map(jnp.sqrt, values, 4))  # its derivative at zero is infinite
-
-    values = jnp.arange(1.0, 8.0)  # seven rows in two chunks
-    np.testing.assert_allclose(jax.grad(total)(values), 0.5 / np.sqrt(values))
-
-
 def test_compiler_options_change_a_sum_by_rounding_only():
     space = make_space(2, 30)
     fields = make_fields(space)
     neighbors, terms = make_list(space, fields), delta_plus_terms(space)
     program = jax.jit(lambda f, n: sums_of(terms, f, space, n)).lower(fields, neighbors)
     _, size = dense_sums(space, fields)
-    in_order, found = program.compile()(fields, neighbors), compiled(program)(fields, neighbors)
+    in_order = program.compile()(fields, neighbors)
+    found = program.compile(COMPILER_OPTIONS)(fields, neighbors)
     assert any((found[name] != in_order[name]).any() for name in in_order)  # they do act
     for name, value in in_order.items():
         np.testing.assert_allclose(found[name], value, atol=1e-13 * size[name], err_msg=name)
@@ -233,7 +206,8 @@ def test_compiler_options_keep_what_is_not_finite(bad):
     fields["density"] = fields["density"].at[7].set(bad)  # in a `where`, a NaN could be lost
     terms = tuple(t for t in delta_plus_terms(space) if t.name == "diffusion_sum")
     program = jax.jit(lambda f, n: sums_of(terms, f, space, n)).lower(fields, neighbors)
-    in_order, found = program.compile()(fields, neighbors), compiled(program)(fields, neighbors)
+    in_order = program.compile()(fields, neighbors)
+    found = program.compile(COMPILER_OPTIONS)(fields, neighbors)
     lost = ~np.isfinite(in_order["diffusion_sum"])
     assert 10 < lost.sum() < 50  # those around it
     np.testing.assert_array_equal(~np.isfinite(found["diffusion_sum"]), lost)
