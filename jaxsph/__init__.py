@@ -7,6 +7,7 @@ from . import effects as effects
 from . import integrate as integrate
 from . import kernels as kernels
 from . import scenes as scenes
+from . import schemes as schemes
 from .compiler_options import COMPILER_OPTIONS as COMPILER_OPTIONS
 from .domain import Box as Box
 from .fluid import Fluid as Fluid

@@ -18,6 +18,16 @@ class LinearEquationOfState(eqx.Module):
         """Density [kg/m^3] of a pressure [Pa]."""
         return reference_density + pressure / sound_speed**2
 
+    def enthalpy(self, density: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Integral of dp / rho [m^2/s^2] from the reference density on."""
+        return sound_speed**2 * jnp.log(density / reference_density)
+
+    def density_of_enthalpy(
+        self, enthalpy: Array, reference_density: Array, sound_speed: Array
+    ) -> Array:
+        """Density [kg/m^3] of an enthalpy [m^2/s^2]."""
+        return reference_density * jnp.exp(enthalpy / sound_speed**2)
+
 
 class TaitEquationOfState(eqx.Module):
     """p = rho0 c0^2 / gamma [(rho / rho0)^gamma - 1] (Cole 1948; Monaghan 1994).
@@ -43,6 +53,19 @@ class TaitEquationOfState(eqx.Module):
         ratio = jnp.maximum(1.0 + pressure / stiffness, floor)
         return reference_density * ratio ** (1.0 / self.exponent)
 
+    def enthalpy(self, density: Array, reference_density: Array, sound_speed: Array) -> Array:
+        """Integral of dp / rho [m^2/s^2] from the reference density on."""
+        power = self.exponent - 1.0
+        return sound_speed**2 / power * ((density / reference_density) ** power - 1.0)
+
+    def density_of_enthalpy(
+        self, enthalpy: Array, reference_density: Array, sound_speed: Array
+    ) -> Array:
+        """Density [kg/m^3] of an enthalpy [m^2/s^2]; at least half the reference density."""
+        power = self.exponent - 1.0
+        ratio = jnp.maximum(1.0 + enthalpy * power / sound_speed**2, 0.5**power)
+        return reference_density * ratio ** (1.0 / power)
+
 
 class Fluid(eqx.Module):
     """A weakly compressible fluid.
@@ -66,3 +89,13 @@ class Fluid(eqx.Module):
     def density(self, pressure: Array) -> Array:
         """Density [kg/m^3] of a pressure [Pa] by the equation of state."""
         return self.equation_of_state.density(pressure, self.reference_density, self.sound_speed)
+
+    def enthalpy(self, density: Array) -> Array:
+        """Integral of dp / rho [m^2/s^2] from the reference density on."""
+        return self.equation_of_state.enthalpy(density, self.reference_density, self.sound_speed)
+
+    def density_of_enthalpy(self, enthalpy: Array) -> Array:
+        """Density [kg/m^3] of an enthalpy [m^2/s^2]."""
+        return self.equation_of_state.density_of_enthalpy(
+            enthalpy, self.reference_density, self.sound_speed
+        )

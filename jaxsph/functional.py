@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .effects import Context, Effect
+from .effects import BodyForce, Context, Effect
 from .fluid import Fluid
 from .neighbors import VerletList, WallList
 from .pairs import Space, pair_sum
@@ -21,9 +21,9 @@ from .walls import Walls
 class SPHFunctional(eqx.Module):
     """dw/dt = f(w, t; mu) for w = (position, velocity, density), the sum of the scene's effects.
 
-    It holds the sums that its effects ask for and no others: two passes over the pairs at most,
-    and where there are walls one over the ghosts before these. Particles always move with their
-    velocity; all else is an effect.
+    It holds the sums that its effects ask for and no others: three passes over the pairs at most,
+    and where there are walls up to two over the ghosts before the second. Particles always move
+    with their velocity; all else is an effect.
 
     Args:
         effects: in the order in which their rates are added.
@@ -84,11 +84,12 @@ class SPHFunctional(eqx.Module):
     def sums(
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
-        """Context, fields and the sums of the second pass, in the list's sorted order."""
+        """Context, fields and sums of the second and the last pass, in the list's sorted order."""
         state = jax.tree.map(neighbors.sort, state)
         walls = None if self.walls is None else self.walls.at(time)
         bodies = None if walls is None else walls.bodies
-        context = Context(time, self.fluid, self.mass, self.space, bodies)
+        forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
+        context = Context(time, self.fluid, self.mass, self.space, bodies, forces)
         fields = {
             "position": state.position,
             "velocity": state.velocity,
@@ -102,8 +103,18 @@ class SPHFunctional(eqx.Module):
         for effect in self.effects if sums else ():
             with jax.named_scope(effect.name):
                 fields = fields | effect.fields(context, fields, sums)
+        ghosts = self._handed(context, fields, ghosts, neighbors)
         with jax.named_scope("rate_pass"):
-            return context, fields, self._sums("rate_terms", fields, ghosts, neighbors)
+            sums = self._sums("rate_terms", fields, ghosts, neighbors)
+        terms = tuple(t for e in self.effects for t in e.closing_terms(self.space))
+        if terms:
+            for effect in self.effects:
+                with jax.named_scope(effect.name):
+                    fields = fields | effect.closing_fields(context, fields, sums)
+            with jax.named_scope("closing_pass"):
+                pairs = neighbors if self.walls is None else neighbors.fluid
+                sums = sums | pair_sum(terms, fields, self.space, pairs)
+        return context, fields, sums
 
     def _sums(self, kind: str, fields, ghosts, neighbors) -> dict[str, Array]:
         """The effects' sums of one pass, over particles and over ghosts."""
@@ -116,7 +127,21 @@ class SPHFunctional(eqx.Module):
         terms = self._wall_terms(f"wall_{kind}")
         with jax.named_scope("walls"):
             added = wall_sums(terms, fields, ghosts, self.space, neighbors.wall)
-        return {name: s + added[name] if name in added else s for name, s in sums.items()}
+        return added | {name: s + added[name] if name in added else s for name, s in sums.items()}
+
+    def _handed(self, context, fields, ghosts, neighbors) -> dict[str, Array]:
+        """Ghosts with what they gather of the first pass's fields."""
+        if self.walls is None:
+            return ghosts
+        terms = tuple(t for e in self.effects for t in e.handing_terms(self.space))
+        if not terms:
+            return ghosts
+        with jax.named_scope("handing_pass"):
+            sums = ghost_sums(terms, fields, ghosts, self.space, neighbors.wall)
+        for effect in self.effects:
+            with jax.named_scope(effect.name):
+                ghosts = ghosts | effect.handing_fields(context, ghosts, sums)
+        return ghosts
 
     def _wall_terms(self, kind: str) -> tuple:
         """The effects' terms of ghosts, of that kind; those for moving bodies where there are."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..scenes import SCENES
 from ..scenes.lid_driven_cavity import LIDS
+from ..schemes import SCHEMES
 from .options import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from .scenes import takes
 
@@ -20,6 +21,7 @@ _NAMES = {
     "arrangement": "arrangement",
     "seed": "arrangement",
     "lid": "lid",
+    "scheme": "scheme",
     "precision": "dtype",
 }
 
@@ -38,6 +40,7 @@ def add_scene_options(add) -> None:
         help="how particles start (default: the scene's)",
     )
     add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
+    add("--scheme", choices=tuple(SCHEMES), help="discretisation (default: delta-plus)")
     add("--precision", choices=("float32", "float64"), help="default: float64")
 
 
@@ -73,6 +76,8 @@ def scene_settings(options, make, precision: str) -> dict[str, Any]:
     if "arrangement" in settings:
         rule = ARRANGEMENTS[options.arrangement or "packed"]
         settings["arrangement"] = rule(seed=options.seed or 0)
+    if "scheme" in settings:
+        settings["scheme"] = SCHEMES[options.scheme]
     return {**settings, "dtype": precision} if "dtype" in takes(make) else settings
 
 

@@ -1,5 +1,6 @@
 """Effects: the parts of the physics that a scene composes, one a file."""
 
+from .adjoint_pressure import AdjointPressure as AdjointPressure
 from .artificial_viscosity import ArtificialViscosity as ArtificialViscosity
 from .background_pressure import BackgroundPressure as BackgroundPressure
 from .base import Context as Context
@@ -9,14 +10,19 @@ from .body_force import BodyForce as BodyForce
 from .body_force import CentralForce as CentralForce
 from .body_force import Gravity as Gravity
 from .body_force import KickAndHold as KickAndHold
+from .consistent_transport import ConsistentTransport as ConsistentTransport
+from .consistent_viscosity import ConsistentViscosity as ConsistentViscosity
 from .continuity import Continuity as Continuity
 from .density_diffusion import DensityDiffusion as DensityDiffusion
 from .free_surface import FreeSurface as FreeSurface
 from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
+from .kernel_correction import KernelCorrection as KernelCorrection
 from .laminar_viscosity import LaminarViscosity as LaminarViscosity
+from .local_no_slip import LocalNoSlip as LocalNoSlip
 from .particle_shifting import ParticleShifting as ParticleShifting
 from .pressure_force import PressureForce as PressureForce
 from .shifting_transport import ShiftingTransport as ShiftingTransport
+from .strain_shifting import StrainShifting as StrainShifting
 from .surface_diffusion import SurfaceDiffusion as SurfaceDiffusion
 from .surface_shifting import SurfaceShifting as SurfaceShifting
 from .surface_tension import SurfaceTension as SurfaceTension

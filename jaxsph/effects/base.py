@@ -23,6 +23,7 @@ class Context(NamedTuple):
     mass: Float[Array, ""]
     space: Space
     bodies: Bodies | None = None
+    forces: tuple[Effect, ...] = ()  # the scene's body forces
 
 
 class WallTerm(NamedTuple):
@@ -49,7 +50,7 @@ def viscous_step_limit(viscosity, space: Space):
 
 
 class Effect(eqx.Module):
-    """A part of the SPH functional, in at most two passes over the pairs.
+    """A part of the SPH functional, in at most three passes over the pairs.
 
     The first pass sees positions, densities, pressures, volumes and velocities; what an effect
     makes of its sums (`fields`) is there for the second pass, whose sums become rates of change of
@@ -57,9 +58,12 @@ class Effect(eqx.Module):
 
     Where a scene has walls, a pass over the ghosts comes first: its sums over fluid particles
     (`ghost_terms`) give the ghosts their values (`ghost_fields`); and in both other passes ghosts
-    add to the sums what an effect's `wall_geometry_terms` and `wall_rate_terms` say. Without walls
-    none of these is called. Where bodies are moved through the fluid, ghosts have a
-    `wall_acceleration` [m/s^2] as well, and the `moving_` forms of these methods are called.
+    add to the sums what an effect's `wall_geometry_terms` and `wall_rate_terms` say. Ghosts may
+    gather once more what the first pass has made (`handing_terms`, `handing_fields`) and hand it on
+    in the second. Without walls none of these is called. A last pass over the fluid's pairs
+    (`closing_terms`) may read fields made of the second's sums (`closing_fields`). Where bodies are
+    moved through the fluid, ghosts have a `wall_acceleration` [m/s^2] as well, and the `moving_`
+    forms of these methods are called.
 
     Coefficients that one may sweep or differentiate are array fields; what changes the structure
     of the computation is static.
@@ -100,6 +104,22 @@ class Effect(eqx.Module):
 
     def wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
         """What ghosts add to sums of the second pass."""
+        return ()
+
+    def handing_terms(self, space: Space) -> tuple[PairTerm, ...]:
+        """Sums wanted for each ghost i over the fluid particles j, of the first pass's fields."""
+        return ()
+
+    def handing_fields(self, context: Context, ghosts: dict, sums: dict) -> dict[str, Array]:
+        """New fields of the ghosts made of these sums, for the second pass."""
+        return {}
+
+    def closing_fields(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
+        """New per-particle fields made of the second pass's sums, for the last."""
+        return {}
+
+    def closing_terms(self, space: Space) -> tuple[PairTerm, ...]:
+        """Sums wanted of the last pass."""
         return ()
 
     def moving_ghost_terms(self, space: Space) -> tuple[PairTerm, ...]:

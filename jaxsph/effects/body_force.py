@@ -1,5 +1,7 @@
 """Body forces."""
 
+from __future__ import annotations
+
 import abc
 
 import equinox as eqx
@@ -7,11 +9,25 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..domain import Box
 from .base import Effect
 
 
 class BodyForce(Effect):
     """du_i/dt = b(t, x_i)."""
+
+    def conservative_part(self, box: Box) -> BodyForce | None:
+        """What of it has a `potential` in a box, periodic directions considered; None if nothing.
+
+        What drives a flow around a periodic direction has none.
+        """
+        return None
+
+    def potential(
+        self, time: Float[Array, ""], position: Float[Array, "points dim"]
+    ) -> Float[Array, " points"]:
+        """Phi [m^2/s^2], b = -grad Phi, of a force that is its own conservative part."""
+        raise NotImplementedError
 
     @abc.abstractmethod
     def acceleration(
@@ -35,6 +51,13 @@ class Gravity(BodyForce):
     def acceleration(self, time, position):
         return jnp.broadcast_to(self.vector[None, :], position.shape)
 
+    def conservative_part(self, box):
+        closed = jnp.asarray([0.0 if p else 1.0 for p in box.periodic], self.vector.dtype)
+        return Gravity(self.vector * closed)
+
+    def potential(self, time, position):
+        return -jnp.sum(self.vector[None, :] * position, axis=1)
+
 
 class CentralForce(BodyForce):
     """b = -Omega^2 (x - x_c): a pull towards a centre that grows with the distance.
@@ -50,6 +73,13 @@ class CentralForce(BodyForce):
     def acceleration(self, time, position):
         center = jnp.asarray(self.center, position.dtype)[None, :]
         return self.frequency**2 * (center - position)
+
+    def conservative_part(self, box):
+        return None if any(box.periodic) else self
+
+    def potential(self, time, position):
+        center = jnp.asarray(self.center, position.dtype)[None, :]
+        return 0.5 * self.frequency**2 * jnp.sum((position - center) ** 2, axis=1)
 
 
 class KickAndHold(BodyForce):

@@ -3,13 +3,13 @@
 import jax.numpy as jnp
 
 from ..pairs import PairTerm
+from ..ramps import ramp, root
 from ..vector import Vector
 from .base import Effect, WallTerm
 from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
 
 _SPLASH = (0.25, 0.4)  # of completeness: single particles and thin jets lie below
 _INTERIOR = (0.95, 0.995)  # 0.50, 0.70, 0.94, 0.999 in the rows under a flat surface, h = 2 dx
-_ROUND_OFF = 1e-12
 
 
 def support_matrix(pair, i, j):
@@ -74,20 +74,8 @@ def smallest_eigenvalue(upper):
     return mean + 2.0 * size * jnp.cos((jnp.arccos(cosine) + 2.0 * jnp.pi) / 3.0)
 
 
-def root(square):
-    """The square root, without a slope at zero."""
-    positive = square > _ROUND_OFF
-    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
-
-
 def _direction(vectors, space):
     """Unit vectors along `vectors` [1/m], zero where these are lost in round-off."""
     scaled = vectors * space.smoothing_length
     length = root(jnp.sum(scaled * scaled, axis=1))
     return scaled / jnp.where(length > 0.0, length, 1.0)[:, None]
-
-
-def ramp(value, low, high):
-    """0 below `low`, 1 above `high`, with a smooth rise between (cubic)."""
-    share = jnp.clip((value - low) / (high - low), 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)

@@ -22,12 +22,16 @@ class ShiftingSum:
 
 def shifting_term(space) -> PairTerm:
     """The sum that the shift velocity follows."""
-    return PairTerm("shifting_sum", (), _weight(space))
+    return PairTerm("shifting_sum", (), shifting_sum(space))
 
 
 def shift_velocity(total, space, speed):
     """du [m/s] from the sums (N, n) and the reference speed U = c0 Ma [m/s]."""
-    raw = -2.0 * space.smoothing_length * speed * total
+    return limited(-2.0 * space.smoothing_length * speed * total, speed)
+
+
+def limited(raw, speed):
+    """Shift velocities (N, n), the longer ones shortened to half the reference speed [m/s]."""
     squared = jnp.sum(raw * raw, axis=1)
     limit = 0.5 * speed
     fast = squared > limit**2
@@ -49,7 +53,7 @@ class ParticleShifting(Effect):
         return (shifting_term(space),)
 
     def wall_geometry_terms(self, space):
-        return (WallTerm("shifting_sum", (), (), _weight(space)),)
+        return (WallTerm("shifting_sum", (), (), shifting_sum(space)),)
 
     def fields(self, context, fields, sums):
         speed = context.fluid.reference_speed
@@ -59,5 +63,6 @@ class ParticleShifting(Effect):
         return {"position": fields["shift_velocity"]}
 
 
-def _weight(space) -> ShiftingSum:
+def shifting_sum(space) -> ShiftingSum:
+    """Its function."""
     return ShiftingSum(0.2 / space.kernel_at_spacing)

@@ -5,9 +5,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
+from ..ramps import ramp, root
 from ..vector import Vector
 from .base import Effect
-from .free_surface import ramp, root
 from .kernel_gradient import KERNEL_GRADIENT
 
 # h |g| is 0.68, 0.28, 0.04, 0.00 in the rows under a flat surface at h = 2 dx

@@ -1,26 +1,17 @@
-"""What all flows between walls share: delta-plus-SPH with ghosts, from rest on a lattice."""
+"""What all flows between walls share: ghosts, and a start from rest on a lattice."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import jax.numpy as jnp
-
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
-from ..effects import (
-    BodyForce,
-    Effect,
-    LaminarViscosity,
-    NoSlip,
-    WallPressure,
-    WallRepulsion,
-)
+from ..effects import BodyForce, Effect
 from ..kernels import Kernel
+from ..schemes import DeltaPlus, Scheme
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
-from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -44,6 +35,7 @@ def enclosed_flow(
     layers: int | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     dtype=None,
     parameters: dict[str, Any],
 ) -> Scene:
@@ -62,11 +54,12 @@ def enclosed_flow(
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
         force: makes the body force in a given dtype, if there is one.
-        wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given.
+        wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
         layers: of ghosts; as many as fill the kernel's support if none is given.
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
         parameters: what the scene was made with, for the record; what all share is added.
 
@@ -74,16 +67,11 @@ def enclosed_flow(
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
     positive(viscosity=viscosity)
+    scheme = DeltaPlus() if scheme is None else scheme
 
     def effects(dtype) -> tuple[Effect, ...]:
         drive = None if force is None else force(dtype)
-        return (
-            *delta_plus(dtype, LaminarViscosity(jnp.asarray(viscosity, dtype))),
-            *(() if drive is None else (drive,)),
-            WallPressure(drive),
-            NoSlip() if wall_velocity is None else wall_velocity,
-            WallRepulsion(fluid_region),
-        )
+        return scheme.effects(dtype, viscosity, drive, fluid_region, wall_velocity)
 
     return composed(
         name,
@@ -100,5 +88,5 @@ def enclosed_flow(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={**parameters, "layers": layers},
+        parameters={**parameters, "layers": layers, "scheme": type(scheme).__name__},
     )

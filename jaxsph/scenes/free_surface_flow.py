@@ -20,8 +20,8 @@ from ..effects import (
     WallPressure,
     WallRepulsion,
 )
+from ..schemes.delta_plus import DELTA
 from ..walls import Region
-from .delta_plus import DELTA
 
 
 def free_surface_effects(

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
+from ..schemes import DeltaPlus, Scheme
 from .composed import composed, pick_scale, positive
-from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -47,6 +47,7 @@ def gresho_vortex(
     end_time: float = 1.0,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -63,6 +64,7 @@ def gresho_vortex(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -70,9 +72,10 @@ def gresho_vortex(
         ValueError: for a resolution or step out of range.
     """
     positive(**{"t-end": end_time})
+    scheme = DeltaPlus() if scheme is None else scheme
     return composed(
         "gresho-vortex",
-        effects=delta_plus,
+        effects=scheme.effects,
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
@@ -84,7 +87,7 @@ def gresho_vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale},
+        parameters={"scale": scale, "scheme": type(scheme).__name__},
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
+from ..schemes import Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -46,6 +47,7 @@ def lid_driven_cavity(
     layers: int | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -64,6 +66,7 @@ def lid_driven_cavity(
         layers: of ghosts; a full support's if none is given (the paper has three).
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -94,6 +97,7 @@ def lid_driven_cavity(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
+        scheme=scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds, "lid": lid},
     )

@@ -18,9 +18,9 @@ from ..effects import (
     SurfaceTension,
 )
 from ..kernels import Kernel
+from ..schemes.delta_plus import DELTA
 from ..walls import BallRegion
 from .composed import composed, pick_scale, positive
-from .delta_plus import DELTA
 from .scales import Scale
 from .scene import Scene
 

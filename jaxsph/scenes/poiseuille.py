@@ -5,8 +5,9 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from ..arrangements import Arrangement, JitteredLattice
-from ..effects import Effect, Gravity, NoSlip
+from ..effects import Effect, Gravity
 from ..kernels import Kernel
+from ..schemes import Scheme
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
 from .scene import Scene
@@ -24,6 +25,7 @@ def poiseuille(
     wall_velocity: Effect | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -40,10 +42,11 @@ def poiseuille(
         time_step: dt [s]; overrides the scale's.
         end_time: [s].
         layers: of ghosts; a full support's if none is given.
-        wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given.
+        wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         arrangement: how particles start; a jittered lattice if none is given (on a lattice in
             line with the flow the viscous sum is off by some percent at h = 2 dx).
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -52,7 +55,6 @@ def poiseuille(
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
     chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
-    wall_velocity = NoSlip() if wall_velocity is None else wall_velocity
     return enclosed_flow(
         "poiseuille",
         box=channel_box(chosen),
@@ -69,10 +71,11 @@ def poiseuille(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
+        scheme=scheme,
         dtype=dtype,
         parameters={
             "scale": scale,
             "reynolds": reynolds,
-            "wall_velocity": wall_velocity.name,
+            "wall_velocity": None if wall_velocity is None else wall_velocity.name,
         },
     )

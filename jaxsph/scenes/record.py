@@ -6,10 +6,11 @@ import dataclasses
 import inspect
 from typing import Any
 
-from .. import arrangements, effects, kernels
+from .. import arrangements, effects, kernels, schemes
 from ..arrangements import Arrangement
 from ..effects import Effect
 from ..kernels import Kernel
+from ..schemes import DeltaPlus, Scheme
 from .scene import Scene
 
 
@@ -41,7 +42,10 @@ def scene_from_record(
     options = dict(parameters)
     if "kernel" in options:
         options["kernel"] = _named(kernels, Kernel, options["kernel"])()
-    if "wall_velocity" in options:
+    if "scheme" in inspect.signature(make).parameters:  # records from before there were any lack it
+        named = options.get("scheme", DeltaPlus.__name__)
+        options["scheme"] = _named(schemes, Scheme, named)()
+    if options.get("wall_velocity") is not None:
         options["wall_velocity"] = _named(effects, Effect, options["wall_velocity"])()
     if arrangement is not None:
         options["arrangement"] = arrangement

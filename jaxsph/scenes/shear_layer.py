@@ -8,10 +8,10 @@ import jax.numpy as jnp
 
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import BackgroundPressure, LaminarViscosity
+from ..effects import BackgroundPressure
 from ..kernels import Kernel
+from ..schemes import DeltaPlus, Scheme
 from .composed import composed, pick_scale, positive
-from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -35,6 +35,7 @@ def shear_layer(
     end_time: float = 1.0,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -60,6 +61,7 @@ def shear_layer(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -80,8 +82,10 @@ def shear_layer(
         )
         return jnp.stack([along, KICK * jnp.sin(2.0 * jnp.pi * x)], axis=1)
 
+    scheme = DeltaPlus() if scheme is None else scheme
+
     def effects(dtype):
-        listed = delta_plus(dtype, LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)))
+        listed = scheme.effects(dtype, 1.0 / reynolds)
         if background_pressure == 0.0:
             return listed
         return (*listed, BackgroundPressure(jnp.asarray(background_pressure, dtype)))
@@ -104,5 +108,6 @@ def shear_layer(
             "reynolds": reynolds,
             "thickness": thickness,
             "background_pressure": background_pressure,
+            "scheme": type(scheme).__name__,
         },
     )

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
-
 from ..arrangements import Arrangement
 from ..domain import Box
-from ..effects import LaminarViscosity
 from ..kernels import Kernel
+from ..schemes import DeltaPlus, Scheme
 from . import taylor_green_solution as exact
 from .composed import composed, pick_scale, positive
-from .delta_plus import delta_plus
 from .scales import Scale
 from .scene import Scene
 
@@ -38,6 +35,7 @@ def taylor_green(
     end_time: float = 1.0,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -55,6 +53,7 @@ def taylor_green(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
+        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -74,6 +73,7 @@ def taylor_green_3d(
     end_time: float = 1.0,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
+    scheme: Scheme | None = None,
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
@@ -83,11 +83,12 @@ def taylor_green_3d(
 
 def _vortex(
     name, dim, scales, *, resolution, reynolds, scale, h_over_dx, time_step, end_time,
-    arrangement, kernel, mach, dtype,
+    arrangement, kernel, scheme, mach, dtype,
 ):  # fmt: skip
     positive(reynolds=reynolds, mach=mach, **{"t-end": end_time})
     chosen = pick_scale(scales, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
     viscosity, density = 1.0 / reynolds, REFERENCE_DENSITY
+    scheme = DeltaPlus() if scheme is None else scheme
 
     def velocity(position):
         if dim == 2:
@@ -101,7 +102,7 @@ def _vortex(
 
     return composed(
         name,
-        effects=lambda dtype: delta_plus(dtype, LaminarViscosity(jnp.asarray(viscosity, dtype))),
+        effects=lambda dtype: scheme.effects(dtype, viscosity),
         box=Box.unit_periodic(dim),
         scale=chosen,
         end_time=end_time,
@@ -113,5 +114,5 @@ def _vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds},
+        parameters={"scale": scale, "reynolds": reynolds, "scheme": type(scheme).__name__},
     )

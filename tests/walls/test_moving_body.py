@@ -35,7 +35,7 @@ from jaxsph.effects import (
 from jaxsph.integrate import AutomaticSteps, FaultCode, FixedSteps, integrate
 from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene
-from jaxsph.scenes.delta_plus import delta_plus
+from jaxsph.schemes import delta_plus
 from jaxsph.walls.walls import fill
 from jaxsph_rom.hyper.eulerian_rates import EulerianRates
 from jaxsph_rom.hyper.reference_operators import ReferenceOperators

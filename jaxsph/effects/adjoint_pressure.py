@@ -1,0 +1,250 @@
+"""Pressure force and continuity whose discrete energy is conserved to round-off."""
+
+import jax
+import jax.numpy as jnp
+
+from ..kernels.moments import lattice_moments
+from ..pairs import PairTerm
+from ..symmetric import product, times
+from .base import Effect, WallTerm
+from .wall_pressure import GHOST_WEIGHT, per_weight
+
+_LONELY = 0.05  # of a full neighbourhood's kernel sum: no mean is taken over fewer
+
+
+def neighbor_share(pair, i, j):
+    """W_ij V_j"""
+    return pair.kernel * j.volume
+
+
+def neighbor_velocity(pair, i, j):
+    """u_j W_ij V_j"""
+    return j.velocity * (pair.kernel * j.volume)
+
+
+def smooth_divergence(pair, i, j):
+    """(s_j - s_i) . L_i grad_i W_ij V_j"""
+    return (j.smooth_velocity - i.smooth_velocity).dot(product(i.correction, pair.gradient))
+
+
+def rough_divergence(pair, i, j):
+    """(a_j + a_i) . grad_i W_ij V_j"""
+    return (j.rough_velocity + i.rough_velocity).dot(pair.gradient)
+
+
+def pressure_difference(pair, i, j):
+    """(p_j - p_i) grad_i W_ij V_j"""
+    return pair.gradient * (j.acting_pressure - i.acting_pressure)
+
+
+def pressure_flux(pair, i, j):
+    """(p_i L_i + p_j L_j) grad_i W_ij V_j"""
+    return product(i.pressure_tensor + j.pressure_tensor, pair.gradient)
+
+
+def handed_force(pair, i, j):
+    """q_j W_ij, q_j with its volume"""
+    return j.smoothed_force * pair.kernel
+
+
+def ghost_mean_pressure(pair, i, j):
+    """p_j W_ij"""
+    return j.acting_pressure * pair.kernel
+
+
+def ghost_mean_velocity(pair, i, j):
+    """s_j W_ij"""
+    return j.smooth_velocity * pair.kernel
+
+
+def ghost_flux(pair, i, j):
+    """a_j . grad_i W_ij V_j"""
+    return j.rough_velocity.dot(pair.gradient)
+
+
+def ghost_force(pair, i, j):
+    """p_j L_j grad_i W_ij V_j"""
+    return product(j.pressure_tensor, pair.gradient)
+
+
+def wall_smooth_divergence(pair, i, j):
+    """(s_g - s_i) . L_i grad_i W_ig V_g"""
+    return (j.mirrored_velocity - i.smooth_velocity).dot(product(i.correction, pair.gradient))
+
+
+def wall_rough_divergence(pair, i, j):
+    """a_i . grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
+    return i.rough_velocity.dot(pair.gradient) + j.handed_flux * (pair.kernel / i.volume)
+
+
+def wall_pressure_flux(pair, i, j):
+    """p_i L_i grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
+    return product(i.pressure_tensor, pair.gradient) + j.handed_force * (pair.kernel / i.volume)
+
+
+_GATHERED = (
+    GHOST_WEIGHT,
+    PairTerm("ghost_mean_pressure", ("acting_pressure",), ghost_mean_pressure),
+    PairTerm("ghost_mean_velocity", ("smooth_velocity",), ghost_mean_velocity),
+    PairTerm("ghost_flux", ("rough_velocity",), ghost_flux),
+    PairTerm("ghost_force", ("pressure_tensor",), ghost_force),
+)
+
+
+class AdjointPressure(Effect):
+    """du_i/dt = -G p / rho_i and drho_i/dt = -rho_i D u, D and G each other's negative adjoint:
+
+        sum_i V_i u_i . (G p)_i = -sum_i V_i p_i (D u)_i,
+
+    so that they only exchange kinetic for acoustic energy, on particles however disordered and
+    beside any wall (derivation: docs, "the consistent scheme"). Both are accurate on smooth fields:
+
+        D = C S - Q^T T (1 - S),    G = (1 - S^T) T Q + S^T P,
+        (C u)_i = sum_j (u_j - u_i) . L_i grad W_ij V_j,
+        (Q p)_i = L_i sum_j (p_j - p_i) grad W_ij V_j,
+        (P p)_i = sum_j (p_i L_i + p_j L_j) grad W_ij V_j = -C^T p,
+
+    transposes in the volume-weighted product, S the mean over a particle's neighbours, weighted by
+    W_ij V_j. A smooth velocity meets the consistent divergence C, the rough rest of it the adjoint
+    of the consistent gradient; a smooth pressure the consistent gradient Q, and what the adjoint of
+    C does otherwise on disordered particles only in the mean over neighbours, where it cancels.
+    T = 1 + theta, with theta = (sum F r^4 / (n + 2)) sum W / (sum F r^2 sum W r^2 / n) on the
+    lattice and F = -W'/r, removes the error of second order that the kernel's width makes.
+
+    At walls a ghost's pressure in Q is the mean p_g = sum_k w_gk p_k over the particles near it,
+    w_gk = W_gk / sum_k W_gk; its velocity in C the mean of S u there, mirrored at the wall. The
+    adjoints follow: what ghosts gather of their neighbours goes back to these by the same w_gk.
+
+    A uniform pressure does nothing to a fluid that fills its box: p is taken less its mean, and D
+    less its own. Where a body force has a potential Phi, p is taken less the pressure of the fluid
+    at rest in it, of enthalpy C - Phi_i with C the mean of a particle's own enthalpy plus Phi, and
+    that pressure's force -b rho_rest / rho_i added in closed form; so a fluid at rest stays there.
+
+    Needs `KernelCorrection` before it. Not for free surfaces, nor for bodies that are moved.
+
+    Raises:
+        ValueError: where bodies are moved through the fluid.
+    """
+
+    def geometry_terms(self, space):
+        return (
+            PairTerm("neighbor_share", (), neighbor_share),
+            PairTerm("neighbor_velocity", ("velocity",), neighbor_velocity),
+        )
+
+    def fields(self, context, fields, sums):
+        velocity, correction = fields["velocity"], fields["correction"]
+        acting, balance = _acting_pressure(context, fields)
+        share = sums["neighbor_share"]
+        met = share > _LONELY
+        share = jnp.where(met, share, 1.0)[:, None]
+        rough = jnp.where(met[:, None], velocity - sums["neighbor_velocity"] / share, 0.0)
+        sharp = 1.0 + _sharpening(context.space)
+        return balance | {
+            "acting_pressure": acting,
+            "neighbor_weight": jnp.where(met[:, None], 1.0 / share, 0.0),
+            "smooth_velocity": velocity - rough,
+            "rough_velocity": sharp * times(correction, rough),
+            "pressure_tensor": acting[:, None] * correction,
+        }
+
+    def rate_terms(self, space):
+        smooth = ("smooth_velocity", "correction")
+        return (
+            PairTerm("smooth_divergence", smooth, smooth_divergence),
+            PairTerm("rough_divergence", ("rough_velocity",), rough_divergence),
+            PairTerm("pressure_difference", ("acting_pressure",), pressure_difference),
+            PairTerm("pressure_flux", ("pressure_tensor",), pressure_flux),
+        )
+
+    def ghost_fields(self, context, ghosts, sums):
+        volume = context.mass / context.fluid.reference_density
+        return {"volume": jnp.broadcast_to(volume, ghosts["position"].shape[:1])}
+
+    def moving_ghost_terms(self, space):
+        raise ValueError(
+            "effects: AdjointPressure knows walls that rest or slide along themselves; for bodies "
+            "that are moved through the fluid list Continuity and PressureForce."
+        )
+
+    def handing_terms(self, space):
+        return _GATHERED
+
+    def handing_fields(self, context, ghosts, sums):
+        normal, space = ghosts["normal"], context.space
+
+        def mean(total):
+            return per_weight(total, sums["ghost_weight"], space)
+
+        def mirrored(total):
+            vectors = jax.vmap(mean, 1, 1)(total)
+            return vectors - 2.0 * jnp.sum(vectors * normal, axis=1, keepdims=True) * normal
+
+        volume = ghosts["volume"]
+        return {
+            "acting_pressure": mean(sums["ghost_mean_pressure"]),
+            "mirrored_velocity": mirrored(sums["ghost_mean_velocity"]),
+            "handed_flux": volume * mean(sums["ghost_flux"]),
+            "handed_force": volume[:, None] * mirrored(sums["ghost_force"]),
+        }
+
+    def wall_rate_terms(self, space):
+        smooth, pressure = ("smooth_velocity", "correction"), ("acting_pressure",)
+        rough, tensor = ("rough_velocity",), ("pressure_tensor",)
+        mirrored = ("mirrored_velocity",)
+        return (
+            WallTerm("smooth_divergence", smooth, mirrored, wall_smooth_divergence),
+            WallTerm("rough_divergence", rough, ("handed_flux",), wall_rough_divergence),
+            WallTerm("pressure_difference", pressure, pressure, pressure_difference),
+            WallTerm("pressure_flux", tensor, ("handed_force",), wall_pressure_flux),
+        )
+
+    def closing_fields(self, context, fields, sums):
+        sharp = 1.0 + _sharpening(context.space)
+        gradient = sharp * times(fields["correction"], sums["pressure_difference"])
+        excess = sums["pressure_flux"] - gradient
+        return {
+            "sharp_gradient": gradient,
+            "smoothed_force": (fields["volume"][:, None] * fields["neighbor_weight"]) * excess,
+        }
+
+    def closing_terms(self, space):
+        return (PairTerm("handed_force", ("smoothed_force",), handed_force),)
+
+    def rates(self, context, fields, sums):
+        density, volume = fields["density"], fields["volume"]
+        alone = fields["neighbor_weight"] <= 0.0
+        gradient = jnp.where(alone, sums["pressure_flux"], fields["sharp_gradient"])
+        gradient = gradient + sums["handed_force"]
+        divergence = sums["smooth_divergence"] + sums["rough_divergence"]
+        divergence = divergence - jnp.sum(volume * divergence) / jnp.sum(volume)
+        velocity = -gradient / density[:, None]
+        if "balanced_force" in fields:
+            velocity = velocity - fields["balanced_force"]
+        return {"velocity": velocity, "density": -density * divergence}
+
+
+def _acting_pressure(context, fields):
+    """p less its mean and the pressure at rest (N,) [Pa]; that one's force, if there is any."""
+    pressure, volume, balance = fields["pressure"], fields["volume"], {}
+    parts = (force.conservative_part(context.space.box) for force in context.forces)
+    forces = [part for part in parts if part is not None]
+    if forces:
+        position, fluid = fields["position"], context.fluid
+        potential = sum(force.potential(context.time, position) for force in forces)
+        total = fluid.enthalpy(fields["density"]) + potential
+        level = jnp.sum(volume * total) / jnp.sum(volume)
+        rest = fluid.density_of_enthalpy(level - potential)
+        pressure = pressure - fluid.pressure(rest)
+        acceleration = sum(force.acceleration(context.time, position) for force in forces)
+        balance["balanced_force"] = (rest / fields["density"])[:, None] * acceleration
+    return pressure - jnp.sum(volume * pressure) / jnp.sum(volume), balance
+
+
+def _sharpening(space) -> float:
+    """theta."""
+    dim = space.box.dim
+    h_over_dx = round(space.smoothing_length / space.spacing, 12)
+    moments = lattice_moments(space.kernel, dim, h_over_dx)
+    slope = moments["slope_4"] / (dim + 2) / moments["slope_2"]
+    return slope / (moments["kernel_2"] / dim / moments["kernel"])

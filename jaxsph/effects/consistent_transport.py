@@ -1,0 +1,40 @@
+"""What a shifted particle meets on its way: the fields' own gradients."""
+
+import jax.numpy as jnp
+
+from ..ramps import ramp
+from ..symmetric import along
+from .adjoint_pressure import neighbor_share
+from .base import Effect, WallTerm
+
+_NEAR = (0.95, 1.0)  # of the kernel's sum that is fluid's
+
+
+class ConsistentTransport(Effect):
+    """Transport of momentum and density by the shift velocity:
+
+        du_i/dt = f_i <grad u>_i du_i,  drho_i/dt = f_i du_i . <grad rho>_i,
+
+    the shift-velocity terms in difference form: exact for linear fields, and nothing where the
+    field is uniform. f falls to zero where ghosts hold more than a twentieth of the kernel's sum:
+    the gradient of a layer thinner than the kernel, as under a lid, is not known there, and what
+    transport by it does to the layer is worse than none (`benchmarks.consistent_walls`).
+
+    Needs the shift velocity, `KernelCorrection` and `DensityDiffusion` before it.
+    """
+
+    def wall_geometry_terms(self, space):
+        return (WallTerm("wall_share", (), (), neighbor_share),)
+
+    def fields(self, context, fields, sums):
+        if "wall_share" not in sums:
+            return {}
+        away = ramp(1.0 - sums["wall_share"], *_NEAR)
+        return {"carried_shift": away[:, None] * fields["shift_velocity"]}
+
+    def rates(self, context, fields, sums):
+        shift = fields.get("carried_shift", fields["shift_velocity"])
+        return {
+            "velocity": along(fields["velocity_gradient"], shift),
+            "density": jnp.sum(shift * fields["density_gradient"], axis=1),
+        }

@@ -1,0 +1,39 @@
+"""Particle shifting as strong as the flow's own deformation."""
+
+import jax.numpy as jnp
+
+from ..ramps import root
+from .base import Effect, WallTerm
+from .particle_shifting import limited, shifting_sum, shifting_term
+
+_STRENGTH = 12.0  # h |S| of a flow at U over ten spacings reaches U there
+
+
+class StrainShifting(Effect):
+    """dx_i/dt = u_i + du_i, du_i as `ParticleShifting` has it with a speed of its own for each
+    particle in place of U:
+
+        U_i = min(12 h (2 S_i : S_i)^(1/2), U),    S = (<grad u> + <grad u>^T) / 2.
+
+    What deforms the fluid is what disorders particles, so nothing else need put them in order: a
+    fluid at rest, in uniform motion or in rigid rotation is not shifted at all, and du vanishes
+    with h, as Michel et al. (2022) ask of a convergent and invariant law. Needs `KernelCorrection`.
+    """
+
+    def geometry_terms(self, space):
+        return (shifting_term(space),)
+
+    def wall_geometry_terms(self, space):
+        return (WallTerm("shifting_sum", (), (), shifting_sum(space)),)
+
+    def fields(self, context, fields, sums):
+        gradient, fluid, space = fields["velocity_gradient"], context.fluid, context.space
+        strain = 0.5 * (gradient + jnp.swapaxes(gradient, 1, 2))
+        scale = space.smoothing_length / fluid.reference_speed
+        rate = root(2.0 * jnp.sum((strain * scale) ** 2, axis=(1, 2)))
+        speed = fluid.reference_speed * jnp.minimum(_STRENGTH * rate, 1.0)
+        raw = -2.0 * space.smoothing_length * speed[:, None] * sums["shifting_sum"]
+        return {"shift_velocity": limited(raw, fluid.reference_speed)}
+
+    def rates(self, context, fields, sums):
+        return {"position": fields["shift_velocity"]}
