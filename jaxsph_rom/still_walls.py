@@ -1,10 +1,16 @@
-"""Reduced models are of fluid in a region that stays as it is."""
+"""Scenes that reduced models know: a region that stays as it is, the delta-plus scheme."""
 
+from jaxsph.effects import AdjointPressure
 from jaxsph.scenes import Scene
 
 
 def check_still(scene: Scene) -> None:
-    """A ValueError if bodies are moved through the fluid of a scene."""
+    """A ValueError if bodies are moved through the fluid of a scene, or its scheme is not known."""
+    if any(isinstance(effect, AdjointPressure) for effect in scene.effects):
+        raise ValueError(
+            f"scheme: reduced models know {scene.name} in the delta-plus scheme only, so far; make "
+            "the scene with scheme=jaxsph.schemes.DeltaPlus()."
+        )
     if scene.walls is not None and scene.walls.bodies is not None:
         raise ValueError(
             f"scene: bodies are moved through the fluid of {scene.name}, and reduced models know "

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxsph.metrics import phase_error
+from benchmarks.references.lid_driven_cavity import constant_lid, solve
+from jaxsph.metrics import local_quadratic, phase_error
 
 
 def test_a_wave_that_is_ahead():
@@ -28,3 +29,29 @@ def test_what_is_steady_has_no_phase():
 def test_a_phase_needs_even_times():
     with pytest.raises(ValueError, match="four evenly spaced times"):
         phase_error(np.array([0.0, 1.0, 2.0, 4.0]), np.zeros((4, 1)), np.zeros((4, 1)))
+
+
+def test_quadratic_fits_are_exact_for_quadratic_fields():
+    rng = np.random.default_rng(0)
+    position, points = rng.uniform(size=(400, 3)), rng.uniform(size=(5, 3))
+
+    def field(x):
+        return 1.0 + x @ [2.0, -1.0, 0.5] + x[:, 0] * x[:, 1] - 3.0 * x[:, 2] ** 2
+
+    found = local_quadratic(points, position, field(position), 0.5)
+    np.testing.assert_allclose(found, field(points), atol=1e-9)
+    with pytest.raises(ValueError, match="a quadratic needs 10"):
+        local_quadratic(points, position, field(position), 0.05)
+
+
+@pytest.mark.parametrize(("side", "most"), [(32, 0.4), (50, 0.2), (100, 0.05)])
+def test_the_probe_of_the_cavity_has_a_tenth_of_the_error_it_judges(side, most):
+    """On the exact flow at Re = 400, percent of the lid's speed; linear fits have 4, 2.5, 0.7."""
+    exact, at = solve(400.0, constant_lid), np.linspace(0.02, 0.98, 25)
+    axis = (np.arange(side) + 0.5) / side
+    position = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    velocity, middle = exact.velocity(position), 0.0 * at + 0.5
+    for points, component in ((np.stack([middle, at], 1), 0), (np.stack([at, middle], 1), 1)):
+        found = local_quadratic(points, position, velocity[:, component], 3.0 / side)
+        apart = np.abs(found - exact.velocity(points)[:, component])
+        assert 100.0 * apart.max() < most

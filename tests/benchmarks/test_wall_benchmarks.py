@@ -60,15 +60,6 @@ def test_the_viscous_sum_on_a_lattice(tmp_path):
     assert abs(jittered["shear_ratio"] - 1.0) < abs(rows["lattice"]["shear_ratio"] - 1.0)
 
 
-def test_local_linear_fits_are_exact_for_linear_fields():
-    rng = np.random.default_rng(0)
-    position = rng.uniform(size=(400, 2))
-    values = position @ [2.0, -1.0] + 0.5
-    points = np.array([[0.5, 0.5], [0.02, 0.98]])  # in the middle and in a corner
-    found = lid_driven_cavity.local_linear(points, position, values, 0.1)
-    np.testing.assert_allclose(found, points @ [2.0, -1.0] + 0.5, rtol=1e-9)
-
-
 def test_misprints_of_the_tables_do_not_count():
     column = lid_driven_cavity._table_column("v", 400)
     assert (

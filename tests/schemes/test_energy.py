@@ -65,8 +65,8 @@ def test_in_single_precision_energy_is_kept_to_single_round_off():
     assert abs(energy_rate(scene, disturbed(scene))) < 1e-6
 
 
-def growth(scene):
-    """Largest real part [c0 / dx] among the eigenvalues about rest, positions held."""
+def eigenvalues(scene):
+    """[1/s], of the rates of velocity and density about rest, positions held."""
     count, dim = scene.state.position.shape
     rates = rates_of(scene)
 
@@ -77,7 +77,12 @@ def growth(scene):
         return jnp.concatenate([found.velocity.ravel(), found.density])
 
     rest = jnp.concatenate([jnp.zeros(count * dim), jnp.ones(count)])
-    return np.linalg.eigvals(np.asarray(jax.jacfwd(change)(rest))).real.max() / SOUND
+    return np.linalg.eigvals(np.asarray(jax.jacfwd(change)(rest)))
+
+
+def growth(scene):
+    """Largest real part among these [c0 / dx]."""
+    return eigenvalues(scene).real.max() / SOUND
 
 
 @pytest.mark.parametrize(
@@ -145,3 +150,25 @@ def test_free_slip_walls_too():
     scene = vessel(8)
     slipping = (*scene.effects[:-2], FreeSlip(), scene.effects[-1])
     assert growth(dataclasses.replace(scene, effects=slipping)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        dict(side=12, periodic=True),
+        dict(side=8, viscosity=30.0),
+        pytest.param(dict(side=12, periodic=True, jitter=0.4), marks=pytest.mark.slow),
+        pytest.param(dict(side=12, periodic=True, viscosity=30.0), marks=pytest.mark.slow),
+        pytest.param(dict(side=8, h_over_dx=1.5, viscosity=30.0), marks=pytest.mark.slow),
+        pytest.param(dict(side=8, h_over_dx=1.5), marks=pytest.mark.slow),
+        pytest.param(dict(side=16, h_over_dx=3.0, periodic=True), marks=pytest.mark.slow),
+        pytest.param(dict(side=5, dim=3), marks=pytest.mark.slow),
+    ],
+    ids=str,
+)
+def test_the_longest_step_is_stable(options):
+    """|R(lambda dt)| of Runge and Kutta's polynomial at the step limit, for every eigenvalue."""
+    scene = vessel(**options)
+    z = eigenvalues(scene) * scene.stable_time_step
+    factor = 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0
+    assert np.abs(factor).max() <= 1.0 + 1e-9

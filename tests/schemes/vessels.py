@@ -29,7 +29,8 @@ def vessel(side, dim=2, *, periodic=False, jitter=0.2, h_over_dx=2.0, kernel=Non
     scheme = Consistent() if scheme is None else scheme
     effects = scheme.effects(dtype, viscosity, force, None if periodic else region)
     state = ParticleState(position, 0.0 * position, jnp.ones(len(position)))
-    steps = max(1, round(end_time * SOUND / h_over_dx))
+    limit = 1.0 if viscosity is None else max(1.0, 8.0 * viscosity / SOUND / h_over_dx)
+    steps = max(1, round(end_time * SOUND / h_over_dx * limit))
     every = max(1, steps // 20)
     steps = every * -(-steps // every)
     scene = Scene("vessel", effects, Fluid(1.0, SOUND, 1.0), space, state, end_time / steps,

@@ -1,0 +1,321 @@
+"""The schemes beside each other: errors with their times, and what each does with its energy.
+
+    python -m benchmarks.schemes --sets vortex plane rest cavity
+
+`vortex`: Taylor-Green against its exact solution at 1 s. `mach`: how much of that is the sound
+speed's. `plane`: Couette and Poiseuille flow. `rest`: disordered particles at rest, kicked, or
+under gravity, for 20 s. `vessels`: a disc in rotation. `cavity`: the lid-driven cavity against a
+converged solver by second-order probes; `fine`: the same at 100 x 100. Finished rows are in the
+JSON file at once; the same command goes on where it was cut short.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import (
+    BallRegion,
+    Box,
+    BoxRegion,
+    Fluid,
+    ParticleState,
+    SimulationError,
+    Space,
+    Walls,
+    run_scene,
+)
+from jaxsph.arrangements import JitteredLattice, Lattice
+from jaxsph.cli import report_errors
+from jaxsph.effects import FreeSlip, Gravity
+from jaxsph.environment import environment
+from jaxsph.io import check_target
+from jaxsph.kernels import WendlandC2
+from jaxsph.metrics import local_quadratic
+from jaxsph.scenes import Scene, couette, lid_driven_cavity, poiseuille, taylor_green
+from jaxsph.scenes import plane_flow_solution as plane
+from jaxsph.scenes import taylor_green_solution as vortex
+from jaxsph.schemes import SCHEMES
+
+from .lid_driven_cavity import LIDS, PROBE_RADIUS
+from .measure import format_rows, number, progress, read_json, tell, write_json
+from .references.lid_driven_cavity import solve
+
+
+def _case(kind, **settings):
+    return {"kind": kind, **settings}
+
+
+SETS: dict[str, list[dict[str, Any]]] = {
+    "vortex": [
+        _case("vortex", side=side, reynolds=reynolds, mach=0.1)
+        for reynolds, sides in ((100.0, (25, 50, 100)), (1000.0, (25, 50, 100)))
+        for side in sides
+    ],
+    "mach": [_case("vortex", side=50, reynolds=100.0, mach=mach) for mach in (0.05, 0.025)],
+    "plane": [
+        _case(kind, side=side, reynolds=10.0)
+        for kind in ("couette", "poiseuille")
+        for side in (25, 50)
+    ],
+    "rest": [
+        _case("box", side=side, dim=dim, walls=walls, start=start, reynolds=reynolds)
+        for dim, side in ((2, 20), (3, 8))
+        for walls, start in (
+            ("closed", "rest"), ("closed", "kick"), ("closed", "gravity"), ("periodic", "rest"),
+            ("periodic", "kick"),
+        )
+        for reynolds in (1e6,)
+        if dim == 2 or walls == "closed"
+    ],
+    "vessels": [_case("disc", side=24, reynolds=1000.0)],
+    "cavity": [
+        _case("cavity", side=side, reynolds=reynolds, lid=lid, end=end)
+        for lid, reynolds, side, end in (
+            ("regularised", 100.0, 40, 12.0), ("constant", 100.0, 32, 10.0),
+            ("constant", 400.0, 32, 20.0), ("constant", 400.0, 32, 40.0),
+            ("constant", 1000.0, 32, 40.0), ("constant", 400.0, 50, 40.0),
+        )
+    ],
+    "fine": [
+        _case("cavity", side=100, reynolds=reynolds, lid="constant", end=end)
+        for reynolds, end in ((100.0, 20.0), (400.0, 40.0))
+    ],
+}  # fmt: skip
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 2: bad input."""
+    return report_errors("schemes", _command, argv)
+
+
+def _command(argv) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m benchmarks.schemes", description=__doc__.splitlines()[0]
+    )
+    add = parser.add_argument
+    add("--sets", choices=tuple(SETS), nargs="+", default=list(SETS), help="default: all")
+    add("--schemes", choices=tuple(SCHEMES), nargs="+", default=list(SCHEMES), help="default: all")
+    add("--json", type=Path, default=Path("benchmarks/results/schemes.json"), metavar="FILE",
+        help="results, and what is done already (default: %(default)s)")  # fmt: skip
+    options = parser.parse_args(argv)
+    check_target(options.json, overwrite=True)
+    rows = (read_json(options.json) or {}).get("rows", [])
+    with jax.enable_x64(True):
+        for case in (case for name in options.sets for case in SETS[name]):
+            for scheme in options.schemes:
+                key = {**case, "scheme": scheme}
+                if any(all(row.get(k) == v for k, v in key.items()) for row in rows):
+                    continue
+                tell(", ".join(f"{name} {value}" for name, value in key.items()))
+                rows.append({**key, **run(case, scheme), "environment": environment()})
+                write_json(options.json, {"rows": rows})
+    print(table(rows))
+    return 0
+
+
+def run(case: dict[str, Any], scheme: str) -> dict[str, Any]:
+    """Errors, energy, density and times of one run; what a lost one had until its fault."""
+    make, judge = KINDS[case["kind"]]
+    scene = make(case, SCHEMES[scheme])
+    fault = {}
+    with progress(case["kind"], scene.steps) as report:
+        try:
+            trajectory = run_scene(scene, progress=report)
+        except SimulationError as error:
+            trajectory, fault = error.trajectory, {"fault": str(error)}
+    density = trajectory.density / float(scene.fluid.reference_density)
+    return {
+        **fault,
+        **({} if fault else judge(case, scene, trajectory)),
+        "reached": float(trajectory.time[-1]),
+        "largest_speed": float(np.linalg.norm(trajectory.velocity, axis=2).max()),
+        "last_speed": float(np.linalg.norm(trajectory.velocity[-1], axis=1).max()),
+        "density_low": float(density.min()),
+        "density_high": float(density.max()),
+        "mean_density_change": float(density[-1].mean() - density[0].mean()),
+        "largest_energy_over_start": _energy(scene, trajectory),
+        "particles": trajectory.particles,
+        "steps": scene.steps,
+        "seconds": trajectory.metadata.get("run_seconds"),
+        "compile_seconds": trajectory.metadata.get("compile_seconds"),
+    }
+
+
+def _energy(scene: Scene, trajectory) -> float | None:
+    """Largest sum m (|u|^2 + c0^2 (rho / rho0 - 1)^2) / 2 over the first; None from rest."""
+    density = trajectory.density / float(scene.fluid.reference_density) - 1.0
+    acoustic = float(scene.fluid.sound_speed) ** 2 * (density**2).sum(axis=1)
+    energy = (trajectory.velocity**2).sum(axis=(1, 2)) + acoustic
+    return float(energy.max() / energy[0]) if energy[0] > 0.0 else None
+
+
+def _with_snapshots(scene: Scene, wanted: int) -> Scene:
+    each = max(k for k in range(1, max(1, scene.steps // wanted) + 1) if scene.steps % k == 0)
+    return dataclasses.replace(scene, steps_per_snapshot=each)
+
+
+# ------------------------------------------------------------------ scenes and their judges
+
+
+def _vortex(case, scheme):
+    step = 1.0 / (2 * round(3.14 * case["side"] * 0.1 / case["mach"]))
+    return taylor_green(
+        case["side"], case["reynolds"], mach=case["mach"], time_step=step, scheme=scheme
+    )
+
+
+def _vortex_errors(case, scene, trajectory):
+    position, time = jnp.asarray(trajectory.position[-1]), float(trajectory.time[-1])
+    viscosity = 1.0 / case["reynolds"]
+    velocity = np.asarray(vortex.velocity(position, time, viscosity))
+    pressure = np.asarray(vortex.pressure(position, time, viscosity, 1000.0))
+    found = trajectory.velocity[-1], trajectory.pressure[-1] - trajectory.pressure[-1].mean()
+    energy = 0.5 * np.exp(-16.0 * np.pi**2 * viscosity * time)
+    pressure = pressure - pressure.mean()
+    return {
+        "energy_error_percent": 100.0 * ((found[0] ** 2).sum(axis=1).mean() / energy - 1.0),
+        "velocity_error_percent": _apart(found[0], velocity),
+        "pressure_error_percent": _apart(found[1], pressure),
+        "momentum": float(np.abs(found[0].mean(axis=0)).max()),
+    }
+
+
+def _apart(found, wanted) -> float:
+    return float(100.0 * np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+
+
+def _channel(case, scheme):
+    make = {"couette": couette, "poiseuille": poiseuille}[case["kind"]]
+    scene = make(case["side"], case["reynolds"], end_time=2.0, scheme=scheme)
+    return _with_snapshots(scene, 40)
+
+
+def _channel_errors(case, scene, trajectory):
+    viscosity, found = 1.0 / case["reynolds"], {}
+    for time in (0.25, 0.5, 1.0, 2.0):
+        k = trajectory.nearest(time)
+        height, at = trajectory.position[k][:, 1], float(trajectory.time[k])
+        if case["kind"] == "couette":
+            along = plane.couette(height, at, viscosity)
+        else:
+            along = plane.poiseuille(height, at, viscosity, 8.0 * viscosity)
+        found[f"{at:g}"] = _apart(trajectory.velocity[k][:, 0], along)
+    return {"velocity_error_percent_at": found, "velocity_error_percent": max(found.values())}
+
+
+def _box(case, scheme):
+    """The unit box, particles jittered by a fifth of a spacing, U = 1 m/s, c0 = 10 m/s."""
+    dim, dx, end = case["dim"], 1.0 / case["side"], 20.0
+    periodic = case["walls"] == "periodic"
+    box = Box((0.0,) * dim, (1.0,) * dim, (periodic,) * dim)
+    space, region = Space(box, WendlandC2(), 2.0 * dx, dx), BoxRegion(box.lower, box.upper)
+    position = JitteredLattice(0.2).positions(space)
+    speed = 0.02 if case["start"] == "kick" else 0.0
+    velocity = speed * jax.random.normal(jax.random.key(1), position.shape)
+    force, density = None, jnp.ones(len(position))
+    if case["start"] == "gravity":
+        force = Gravity(jnp.zeros(dim).at[dim - 1].set(-1.0))
+        density = density + (1.0 - position[:, dim - 1]) / 100.0
+    effects = scheme.effects(
+        jnp.float64, 1.0 / case["reynolds"], force, None if periodic else region
+    )
+    every = round(end / 20.0 / (0.2 * dx))
+    return Scene(
+        "box", effects, Fluid(1.0, 10.0, 1.0), space, ParticleState(position, velocity, density),
+        end / (20 * every), end, every, walls=None if periodic else Walls.around(region, space),
+    )  # fmt: skip
+
+
+def _disc(case, scheme):
+    """A disc of fluid of radius 0.6 m in rotation by 1 rad/s, between free-slip walls."""
+    dx = 1.2 / case["side"]
+    box, region = Box((0.0, 0.0), (1.4, 1.4), (False, False)), BallRegion((0.7, 0.7), 0.6)
+    space = Space(box, WendlandC2(), 2.0 * dx, dx)
+    position = Lattice().positions(space)
+    position = position[np.asarray(region.signed_distance(position)) < -0.25 * dx]
+    offset = position - 0.7
+    velocity = jnp.stack([-offset[:, 1], offset[:, 0]], axis=1)
+    density = 1000.0 + 5.0 * (jnp.sum(offset**2, axis=1) - 0.36)
+    effects = scheme.effects(jnp.float64, 1.0 / case["reynolds"], None, region, FreeSlip())
+    return Scene(
+        "disc", effects, Fluid(1000.0, 10.0, 1.0), space,
+        ParticleState(position, velocity, density), 20.0 / 1400, 20.0, 70,
+        walls=Walls.around(region, space),
+    )  # fmt: skip
+
+
+def _momentum_kept(case, scene, trajectory):
+    offset = trajectory.position - 0.7
+    turned = offset[..., 0] * trajectory.velocity[..., 1]
+    turned = (turned - offset[..., 1] * trajectory.velocity[..., 0]).sum(axis=1)
+    return {"angular_momentum_kept": float(turned[-1] / turned[0])}
+
+
+def _cavity(case, scheme):
+    scene = lid_driven_cavity(
+        case["side"], case["reynolds"], lid=case["lid"], end_time=case["end"], scheme=scheme,
+        time_step=None if case["side"] < 100 else case["end"] / round(case["end"] / 1.25e-3),
+    )  # fmt: skip
+    return _with_snapshots(scene, round(5 * case["end"]))
+
+
+def _cavity_errors(case, scene, trajectory):
+    """Largest deviations on the centre lines, means over the last second."""
+    at = np.linspace(0.02, 0.98, 25)
+    lines = np.stack([0.0 * at + 0.5, at], axis=1), np.stack([at, 0.0 * at + 0.5], axis=1)
+    exact = solve(case["reynolds"], LIDS[case["lid"]])
+    radius, errors = PROBE_RADIUS * scene.space.spacing, {}
+    start = trajectory.time[-1] - 1.0
+    for name, points, component in (("u", lines[0], 0), ("v", lines[1], 1)):
+        found = np.mean([
+            local_quadratic(
+                points, trajectory.position[k], trajectory.velocity[k][:, component], radius
+            )
+            for k in np.flatnonzero(trajectory.time > start)
+        ], axis=0)  # fmt: skip
+        apart = np.abs(found - exact.velocity(points)[:, component])
+        errors[f"{name}_error_percent"] = float(100.0 * apart.max())
+        errors[f"{name}_rms_error_percent"] = float(100.0 * np.sqrt((apart**2).mean()))
+    energy = (trajectory.velocity**2).sum(axis=(1, 2))
+    before = trajectory.nearest(0.75 * case["end"])
+    errors["change_in_last_quarter_percent"] = float(100.0 * (energy[-1] / energy[before] - 1.0))
+    return errors
+
+
+KINDS = {
+    "vortex": (_vortex, _vortex_errors),
+    "couette": (_channel, _channel_errors),
+    "poiseuille": (_channel, _channel_errors),
+    "box": (_box, lambda case, scene, trajectory: {}),
+    "disc": (_disc, _momentum_kept),
+    "cavity": (_cavity, _cavity_errors),
+}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """One line a run."""
+    header = ("case", "scheme", "error %", "p or v %", "energy", "speed", "mean rho", "run s")
+    cells = []
+    for row in rows:
+        told = ("side", "dim", "reynolds", "walls", "start", "lid", "end", "mach")
+        settings = [str(row[k]) for k in told if k in row]
+        first = row.get("velocity_error_percent", row.get("u_error_percent"))
+        second = row.get("pressure_error_percent", row.get("v_error_percent"))
+        lost = f"lost at {row['reached']:.3g} s" if "fault" in row else number(row["last_speed"])
+        cells.append((
+            " ".join([row["kind"], *settings]), row["scheme"], number(first), number(second),
+            number(row["largest_energy_over_start"], 4), lost,
+            number(row["mean_density_change"]), number(row["seconds"]),
+        ))  # fmt: skip
+    return format_rows(header, cells)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
