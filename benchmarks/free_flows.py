@@ -10,6 +10,7 @@ command goes on where it was cut short. A run that ends in a fault is a row that
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,6 +34,7 @@ from jaxsph.scenes.elliptic_drop import semi_axes
 from jaxsph.scenes.gresho_vortex import gresho_velocity
 from jaxsph.scenes.piston_wave_maker import wave_height, wave_number
 from jaxsph.scenes.standing_wave import damping
+from jaxsph.schemes import DeltaPlus
 
 from .measure import format_rows, number, progress, read_json, tell, write_json
 from .references.dam_break import (
@@ -95,7 +97,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def run(name: str, resolution: int) -> dict[str, Any]:
     """A full run of a scene and its row."""
-    scene = SCENES.get(name, _impact_scene)(resolution=resolution)
+    make = SCENES.get(name, _impact_scene)
+    schemed = {"scheme": DeltaPlus()} if "scheme" in inspect.signature(make).parameters else {}
+    scene = make(resolution=resolution, **schemed)
     row = {
         "scene": name,
         "resolution": resolution,

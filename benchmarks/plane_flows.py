@@ -26,6 +26,7 @@ from jaxsph.io import check_target
 from jaxsph.scenes import Scene, couette, hydrostatic_tank, poiseuille
 from jaxsph.scenes import plane_flow_solution as exact
 from jaxsph.scenes.hydrostatic_tank import GRAVITY, REFERENCE_DENSITY, hydrostatic_pressure
+from jaxsph.schemes import DeltaPlus
 
 from .measure import format_rows, number, progress, read_json, tell, write_json
 
@@ -102,6 +103,7 @@ def make_scene(case: dict[str, Any]) -> Scene:
         "h_over_dx": case["h_over_dx"],
         "end_time": case["end_time"],
         "layers": case["layers"],
+        "scheme": DeltaPlus(),
     }
     if case["flow"] == "hydrostatic-tank":
         scene = hydrostatic_tank(case["resolution"], **settings)

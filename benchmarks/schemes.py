@@ -5,8 +5,9 @@
 `vortex`: Taylor-Green against its exact solution at 1 s. `mach`: how much of that is the sound
 speed's. `plane`: Couette and Poiseuille flow. `rest`: disordered particles at rest, kicked, or
 under gravity, for 20 s. `vessels`: a disc in rotation. `cavity`: the lid-driven cavity against a
-converged solver by second-order probes; `fine`: the same at 100 x 100. Finished rows are in the
-JSON file at once; the same command goes on where it was cut short.
+converged solver by second-order probes; `fine`: the same at 100 x 100. `rates`: one right-hand side
+and its gradient by reverse mode, both schemes in turns. Finished rows are in the JSON file at once;
+the same command goes on where it was cut short.
 """
 
 from __future__ import annotations
@@ -38,14 +39,25 @@ from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.kernels import WendlandC2
 from jaxsph.metrics import local_quadratic
-from jaxsph.scenes import Scene, couette, lid_driven_cavity, poiseuille, taylor_green
+from jaxsph.scenes import SCENES, Scene, couette, lid_driven_cavity, poiseuille, taylor_green
 from jaxsph.scenes import plane_flow_solution as plane
 from jaxsph.scenes import taylor_green_solution as vortex
 from jaxsph.schemes import SCHEMES
 
 from .lid_driven_cavity import LIDS, PROBE_RADIUS
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import (
+    alternate,
+    compiled,
+    format_rows,
+    number,
+    progress,
+    read_json,
+    tell,
+    write_json,
+)
 from .references.lid_driven_cavity import solve
+
+_REPEATS = 30
 
 
 def _case(kind, **settings):
@@ -83,6 +95,13 @@ SETS: dict[str, list[dict[str, Any]]] = {
             ("constant", 1000.0, 32, 40.0), ("constant", 400.0, 50, 40.0),
         )
     ],
+    "rates": [
+        _case("rates", scene=scene, side=side)
+        for scene, side in (
+            ("taylor-green", 50), ("taylor-green", 100), ("lid-driven-cavity", 50),
+            ("lid-driven-cavity", 100), ("taylor-green-3d", 24),
+        )
+    ],
     "fine": [
         _case("cavity", side=100, reynolds=reynolds, lid="constant", end=end)
         for reynolds, end in ((100.0, 20.0), (400.0, 40.0))
@@ -109,12 +128,13 @@ def _command(argv) -> int:
     rows = (read_json(options.json) or {}).get("rows", [])
     with jax.enable_x64(True):
         for case in (case for name in options.sets for case in SETS[name]):
-            for scheme in options.schemes:
+            for scheme in ("both",) if case["kind"] == "rates" else options.schemes:
                 key = {**case, "scheme": scheme}
                 if any(all(row.get(k) == v for k, v in key.items()) for row in rows):
                     continue
                 tell(", ".join(f"{name} {value}" for name, value in key.items()))
-                rows.append({**key, **run(case, scheme), "environment": environment()})
+                found = rates(case) if scheme == "both" else run(case, scheme)
+                rows.append({**key, **found, "environment": environment()})
                 write_json(options.json, {"rows": rows})
     print(table(rows))
     return 0
@@ -145,6 +165,34 @@ def run(case: dict[str, Any], scheme: str) -> dict[str, Any]:
         "steps": scene.steps,
         "seconds": trajectory.metadata.get("run_seconds"),
         "compile_seconds": trajectory.metadata.get("compile_seconds"),
+    }
+
+
+def rates(case: dict[str, Any]) -> dict[str, Any]:
+    """Least times of a right-hand side and of a gradient through it [ms], and their ratios."""
+    calls = {}
+    for name, scheme in SCHEMES.items():
+        scene = SCENES[case["scene"]](case["side"], scheme=scheme)
+        functional, neighbors = scene.functional(), scene.search().build(scene.state.position)
+        time = jnp.zeros((), scene.state.density.dtype)
+
+        def change(state, functional=functional, neighbors=neighbors, time=time):
+            return functional(time, state, neighbors)
+
+        def squared(state, change=change):
+            return sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(change(state)))
+
+        calls[f"{name}_ms"] = compiled(change, scene.state)[0]
+        calls[f"{name}_gradient_ms"] = compiled(jax.grad(squared), scene.state)[0]
+    wall, _ = alternate(calls, _REPEATS)
+    found = {name: 1e3 * min(seconds) for name, seconds in wall.items()}
+    return {
+        **found,
+        "ratio": found["consistent_ms"] / found["delta-plus_ms"],
+        **{
+            f"{name}_reverse_over_forward": found[f"{name}_gradient_ms"] / found[f"{name}_ms"]
+            for name in SCHEMES
+        },
     }
 
 
@@ -304,6 +352,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     header = ("case", "scheme", "error %", "p or v %", "energy", "speed", "mean rho", "run s")
     cells = []
     for row in rows:
+        if row["kind"] == "rates":
+            continue
         told = ("side", "dim", "reynolds", "walls", "start", "lid", "end", "mach")
         settings = [str(row[k]) for k in told if k in row]
         first = row.get("velocity_error_percent", row.get("u_error_percent"))

@@ -40,7 +40,7 @@ def add_scene_options(add) -> None:
         help="how particles start (default: the scene's)",
     )
     add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
-    add("--scheme", choices=tuple(SCHEMES), help="discretisation (default: delta-plus)")
+    add("--scheme", choices=tuple(SCHEMES), help="discretisation (default: the scene's)")
     add("--precision", choices=("float32", "float64"), help="default: float64")
 
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from ..kernels.moments import lattice_moments
 from ..pairs import PairTerm
 from ..symmetric import product, times
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, given
 from .wall_pressure import GHOST_WEIGHT, per_weight
 
 _LONELY = 0.05  # of a full neighbourhood's kernel sum: no mean is taken over fewer
@@ -123,7 +123,7 @@ class AdjointPressure(Effect):
     Needs `KernelCorrection` before it. Not for free surfaces, nor for bodies that are moved.
 
     Raises:
-        ValueError: where bodies are moved through the fluid.
+        ValueError: where bodies are moved through the fluid, and beside `FreeSurface`.
     """
 
     def geometry_terms(self, space):
@@ -133,7 +133,13 @@ class AdjointPressure(Effect):
         )
 
     def fields(self, context, fields, sums):
-        velocity, correction = fields["velocity"], fields["correction"]
+        if "interior" in fields:
+            raise ValueError(
+                "effects: AdjointPressure is for a fluid that fills its box; with FreeSurface list "
+                "Continuity and PressureForce."
+            )
+        velocity = fields["velocity"]
+        correction = given(fields, "correction", self, "KernelCorrection")
         acting, balance = _acting_pressure(context, fields)
         share = sums["neighbor_share"]
         met = share > _LONELY

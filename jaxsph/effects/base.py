@@ -39,6 +39,17 @@ class WallTerm(NamedTuple):
     function: Callable
 
 
+def given(fields: dict, name: str, reader: Effect, giver: str) -> Array:
+    """A field that an effect reads of one before it.
+
+    Raises:
+        ValueError: if none has given it.
+    """
+    if name not in fields:
+        raise ValueError(f"effects: {reader.name} needs {giver} before it; list that first.")
+    return fields[name]
+
+
 VISCOUS_LIMIT = 0.125  # dt <= 0.125 h^2 / nu (Morris et al. 1997)
 
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from ..ramps import ramp
 from ..symmetric import along
 from .adjoint_pressure import neighbor_share
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, given
 
 _NEAR = (0.95, 1.0)  # of the kernel's sum that is fluid's
 
@@ -27,13 +27,15 @@ class ConsistentTransport(Effect):
         return (WallTerm("wall_share", (), (), neighbor_share),)
 
     def fields(self, context, fields, sums):
+        given(fields, "velocity_gradient", self, "KernelCorrection")
+        given(fields, "density_gradient", self, "DensityDiffusion")
+        shift = given(fields, "shift_velocity", self, "StrainShifting or ParticleShifting")
         if "wall_share" not in sums:
-            return {}
-        away = ramp(1.0 - sums["wall_share"], *_NEAR)
-        return {"carried_shift": away[:, None] * fields["shift_velocity"]}
+            return {"carried_shift": shift}
+        return {"carried_shift": ramp(1.0 - sums["wall_share"], *_NEAR)[:, None] * shift}
 
     def rates(self, context, fields, sums):
-        shift = fields.get("carried_shift", fields["shift_velocity"])
+        shift = fields["carried_shift"]
         return {
             "velocity": along(fields["velocity_gradient"], shift),
             "density": jnp.sum(shift * fields["density_gradient"], axis=1),

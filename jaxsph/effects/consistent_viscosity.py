@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from ..kernels.moments import slope_moment
 from ..pairs import PairTerm
 from ..symmetric import along
-from .base import Effect, WallTerm, viscous_step_limit
+from .base import Effect, WallTerm, given, viscous_step_limit
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,8 @@ class ConsistentViscosity(Effect):
         )
 
     def fields(self, context, fields, sums):
-        linear = along(fields["velocity_gradient"], sums["sharp_gradient"])
+        gradient = given(fields, "velocity_gradient", self, "KernelCorrection")
+        linear = along(gradient, sums["sharp_gradient"])
         return {"sharp_trace": sums["sharp_trace"], "linear_part": linear}
 
     def rate_terms(self, space):

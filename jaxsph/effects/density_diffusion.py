@@ -61,4 +61,3 @@ class DensityDiffusion(Effect):
     def rates(self, context, fields, sums):
         strength = 2.0 * self.delta * context.space.smoothing_length * context.fluid.sound_speed
         return {"density": strength * sums["diffusion_sum"]}
-

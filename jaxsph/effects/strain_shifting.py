@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from ..ramps import root
-from .base import Effect, WallTerm
+from .base import Effect, WallTerm, given
 from .particle_shifting import limited, shifting_sum, shifting_term
 
 _STRENGTH = 12.0  # h |S| of a flow at U over ten spacings reaches U there
@@ -27,7 +27,8 @@ class StrainShifting(Effect):
         return (WallTerm("shifting_sum", (), (), shifting_sum(space)),)
 
     def fields(self, context, fields, sums):
-        gradient, fluid, space = fields["velocity_gradient"], context.fluid, context.space
+        gradient = given(fields, "velocity_gradient", self, "KernelCorrection")
+        fluid, space = context.fluid, context.space
         strain = 0.5 * (gradient + jnp.swapaxes(gradient, 1, 2))
         scale = space.smoothing_length / fluid.reference_speed
         rate = root(2.0 * jnp.sum((strain * scale) ** 2, axis=(1, 2)))

@@ -10,7 +10,7 @@ from ..domain import Box
 from ..effects import Effect
 from ..effects.base import VISCOUS_LIMIT
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -59,7 +59,7 @@ def couette(
         arrangement: how particles start; a jittered lattice if none is given (on a lattice in
             line with the flow the viscous sum is off by some percent at h = 2 dx).
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -84,7 +84,7 @@ def couette(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=Consistent() if scheme is None else scheme,
         dtype=dtype,
         parameters={
             "scale": scale,

@@ -9,7 +9,7 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import BodyForce, Effect
 from ..kernels import Kernel
-from ..schemes import DeltaPlus, Scheme
+from ..schemes import Scheme
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
 from .scales import Scale
@@ -27,6 +27,7 @@ def enclosed_flow(
     reference_speed: float,
     mach: float,
     viscosity: float,
+    scheme: Scheme,
     side: float | None = None,
     moving: Sequence[MovingWall] = (),
     force: Callable[[Any], BodyForce] | None = None,
@@ -35,7 +36,6 @@ def enclosed_flow(
     layers: int | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
-    scheme: Scheme | None = None,
     dtype=None,
     parameters: dict[str, Any],
 ) -> Scene:
@@ -51,6 +51,7 @@ def enclosed_flow(
         reference_speed: U [m/s].
         mach: U / c0.
         viscosity: nu [m^2/s].
+        scheme: of `jaxsph.schemes`.
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
         force: makes the body force in a given dtype, if there is one.
@@ -59,7 +60,6 @@ def enclosed_flow(
         layers: of ghosts; as many as fill the kernel's support if none is given.
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
         parameters: what the scene was made with, for the record; what all share is added.
 
@@ -67,7 +67,6 @@ def enclosed_flow(
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
     positive(viscosity=viscosity)
-    scheme = DeltaPlus() if scheme is None else scheme
 
     def effects(dtype) -> tuple[Effect, ...]:
         drive = None if force is None else force(dtype)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
-from ..schemes import DeltaPlus, Scheme
+from ..schemes import Consistent, Scheme
 from .composed import composed, pick_scale, positive
 from .scales import Scale
 from .scene import Scene
@@ -64,7 +64,7 @@ def gresho_vortex(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -72,7 +72,7 @@ def gresho_vortex(
         ValueError: for a resolution or step out of range.
     """
     positive(**{"t-end": end_time})
-    scheme = DeltaPlus() if scheme is None else scheme
+    scheme = Consistent() if scheme is None else scheme
     return composed(
         "gresho-vortex",
         effects=scheme.effects,

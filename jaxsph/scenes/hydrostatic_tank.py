@@ -8,7 +8,7 @@ from ..arrangements import Arrangement
 from ..domain import Box
 from ..effects import Gravity
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -59,7 +59,7 @@ def hydrostatic_tank(
         layers: of ghosts; a full support's if none is given.
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -83,7 +83,7 @@ def hydrostatic_tank(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=Consistent() if scheme is None else scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds},
     )

@@ -8,7 +8,7 @@ import numpy as np
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import DeltaPlus, Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -97,7 +97,7 @@ def lid_driven_cavity(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=DeltaPlus() if scheme is None else scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds, "lid": lid},
     )

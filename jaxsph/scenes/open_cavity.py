@@ -9,7 +9,7 @@ from ..arrangements import Arrangement
 from ..domain import Box
 from ..effects import KickAndHold
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import DeltaPlus, Scheme
 from ..walls import BoxRegion
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -104,7 +104,7 @@ def open_cavity(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=DeltaPlus() if scheme is None else scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds, "start_time": start_time},
     )

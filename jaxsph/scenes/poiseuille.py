@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement, JitteredLattice
 from ..effects import Effect, Gravity
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import Consistent, Scheme
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
 from .scene import Scene
@@ -46,7 +46,7 @@ def poiseuille(
         arrangement: how particles start; a jittered lattice if none is given (on a lattice in
             line with the flow the viscous sum is off by some percent at h = 2 dx).
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -71,7 +71,7 @@ def poiseuille(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=Consistent() if scheme is None else scheme,
         dtype=dtype,
         parameters={
             "scale": scale,

@@ -10,7 +10,7 @@ from ..arrangements import Arrangement
 from ..domain import Box
 from ..effects import BackgroundPressure
 from ..kernels import Kernel
-from ..schemes import DeltaPlus, Scheme
+from ..schemes import Consistent, Scheme
 from .composed import composed, pick_scale, positive
 from .scales import Scale
 from .scene import Scene
@@ -61,7 +61,7 @@ def shear_layer(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -82,7 +82,7 @@ def shear_layer(
         )
         return jnp.stack([along, KICK * jnp.sin(2.0 * jnp.pi * x)], axis=1)
 
-    scheme = DeltaPlus() if scheme is None else scheme
+    scheme = Consistent() if scheme is None else scheme
 
     def effects(dtype):
         listed = scheme.effects(dtype, 1.0 / reynolds)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
-from ..schemes import DeltaPlus, Scheme
+from ..schemes import Consistent, DeltaPlus, Scheme
 from . import taylor_green_solution as exact
 from .composed import composed, pick_scale, positive
 from .scales import Scale
@@ -41,7 +41,7 @@ def taylor_green(
 ) -> Scene:
     """The decaying Taylor-Green vortex on the periodic unit square (paper, first experiment).
 
-    Re = U L / nu with U = 1 m/s and L = 1 m; rho0 = 1000 kg/m^3; delta-plus-SPH with delta = 0.1.
+    Re = U L / nu with U = 1 m/s and L = 1 m; rho0 = 1000 kg/m^3.
     The initial density follows from the exact pressure.
 
     Args:
@@ -77,7 +77,8 @@ def taylor_green_3d(
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
-    """The Taylor-Green vortex on the periodic unit cube; arguments as `taylor_green`."""
+    """The Taylor-Green vortex on the periodic unit cube; arguments as `taylor_green`, but that the
+    scheme is `Consistent()` if none is given."""
     return _vortex("taylor-green-3d", 3, SCALES_3D, **locals())
 
 
@@ -88,7 +89,8 @@ def _vortex(
     positive(reynolds=reynolds, mach=mach, **{"t-end": end_time})
     chosen = pick_scale(scales, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
     viscosity, density = 1.0 / reynolds, REFERENCE_DENSITY
-    scheme = DeltaPlus() if scheme is None else scheme
+    if scheme is None:
+        scheme = DeltaPlus() if dim == 2 else Consistent()
 
     def velocity(position):
         if dim == 2:

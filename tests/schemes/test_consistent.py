@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from jaxsph import BoxRegion, MovingBody, ParticleState, run_scene
-from jaxsph.effects import ConsistentViscosity, Gravity, KernelCorrection, StrainShifting
+from jaxsph.effects import (
+    ConsistentViscosity,
+    FreeSurface,
+    Gravity,
+    KernelCorrection,
+    StrainShifting,
+)
 from jaxsph.scenes import SCENES, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph.scenes.record import scene_from_record
@@ -117,3 +123,19 @@ def test_bodies_that_are_moved_are_refused():
     moved = dataclasses.replace(scene, walls=walls, state=start)
     with pytest.raises(ValueError, match="Continuity and PressureForce"):
         run_scene(moved)
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        (lambda all: all[1:], "AdjointPressure needs KernelCorrection before it"),
+        (lambda all: (*all[:3], *all[4:]), "ConsistentTransport needs DensityDiffusion before it"),
+        (lambda all: (FreeSurface(), *all), "for a fluid that fills its box"),
+    ],
+    ids=["no correction", "no diffusion", "a free surface"],
+)
+def test_effects_that_do_not_fit_are_refused_by_name(effects, message):
+    scene = vessel(12, periodic=True, viscosity=0.1)
+    scene = dataclasses.replace(scene, effects=effects(scene.effects))
+    with pytest.raises(ValueError, match=message):
+        rates_of(scene)(scene.state)

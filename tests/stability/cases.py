@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .consistent_cases import CONSISTENT
 from .free_cases import FREE
 from .full_cases import FULL
 from .judge import Case
@@ -24,4 +25,4 @@ def _table(*groups: tuple[Case, ...]) -> dict[str, Case]:
     return table
 
 
-CASES = _table(FULL, FREE, SPOILT, REDUCED, ON_REFERENCE_POINTS)
+CASES = _table(FULL, CONSISTENT, FREE, SPOILT, REDUCED, ON_REFERENCE_POINTS)

@@ -15,6 +15,7 @@ from jaxsph.scenes import (
     open_cavity,
     taylor_green,
 )
+from jaxsph.schemes import DeltaPlus
 
 from .bounds import CAVITY, CHANNEL, TANK, VORTEX
 from .judge import Case, Ending, Run
@@ -62,7 +63,9 @@ def _damped_cavity(resolution: int, reynolds: float, end_time: float, precision:
 
 
 def _tank(resolution: int, end_time: float, precision: str) -> Run:
-    scene = hydrostatic_tank(resolution, end_time=end_time, dtype=precision)
+    scene = hydrostatic_tank(
+        resolution, end_time=end_time, scheme=DeltaPlus(), dtype=precision
+    )
     return Run(scene, interval(scene, 50))
 
 

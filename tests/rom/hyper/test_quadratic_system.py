@@ -12,6 +12,7 @@ from jaxsph.effects import IsotropicViscosity
 from jaxsph.integrate import integrate
 from jaxsph.scenes import couette, lid_driven_cavity, open_cavity, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Basis, Energy, ReferenceSpace, pod
 from jaxsph_rom.hyper import (
     QuadraticSystem,
@@ -105,7 +106,7 @@ def test_operators_are_the_full_models_right_hand_side_about_rest(vortex):
 
 
 def test_walls_reach_the_operators():
-    scene = couette(16, 10.0, arrangement=Lattice())
+    scene = couette(16, 10.0, arrangement=Lattice(), scheme=DeltaPlus())
     operators = ReferenceOperators.of_scene(scene, scene.state.position)
     y = np.asarray(scene.state.position)[:, 1]
     linear = jnp.zeros((len(y), 3)).at[:, 0].set(scene.fluid.reference_density).at[:, 1].set(y)

@@ -1,0 +1,67 @@
+"""Hard cases of the consistent scheme: rest and kicks, and what the delta-plus scheme fails at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import equinox as eqx
+import jax
+
+from jaxsph.arrangements import JitteredLattice
+from jaxsph.scenes import Scene, hydrostatic_tank, lid_driven_cavity, shear_layer, taylor_green
+from jaxsph.schemes import Consistent
+
+from .bounds import CAVITY, DECAY, DENSITY, LAYER, TANK, VORTEX, WALLS
+from .full_cases import interval
+from .judge import Case, Run
+
+_KICK = 0.02  # m/s, of U = 1 m/s
+
+
+def _run(make: Callable[..., Scene], snapshots: int = 40, **settings) -> Run:
+    scene = make(**{"dtype": "float64", **settings}, scheme=Consistent())
+    return Run(scene, interval(scene, snapshots))
+
+
+def _kicked(resolution: int, end_time: float) -> Run:
+    """A closed box of disordered particles with random velocities, under a resting lid."""
+    run = _run(
+        lid_driven_cavity, resolution=resolution, reynolds=1e6, end_time=end_time,
+        arrangement=JitteredLattice(),
+    )  # fmt: skip
+    velocity = _KICK * jax.random.normal(jax.random.key(0), run.scene.state.velocity.shape)
+    resting = eqx.tree_at(lambda s: s.walls.velocity, run.scene, 0.0 * run.scene.walls.velocity)
+    return Run(eqx.tree_at(lambda s: s.state.velocity, resting, velocity), run.steps_per_snapshot)
+
+
+def _case(name, what, bounds, make, slow=False, **settings) -> Case:
+    precision = settings.get("dtype", "float64")
+    run = partial(_run, make, **settings)
+    return Case(f"consistent/{name}", what, run, bounds, slow=slow, precision=precision)
+
+
+CONSISTENT = (
+    Case("consistent/kicked", "closed box of 16 x 16, jittered, Re = 1e6, kicked by 0.02 U, 10 s",
+         partial(_kicked, 16, 10.0), (DENSITY, DECAY, WALLS)),
+    _case("tank-re-1e6", "tank of 16 x 16 jittered particles at Re = 1e6, 20 s", TANK,
+          hydrostatic_tank, resolution=16, reynolds=1e6, end_time=20.0,
+          arrangement=JitteredLattice()),
+    _case("cavity-re-5e3", "cavity at Re = 5000, 20 x 20, 4 s", CAVITY,
+          lid_driven_cavity, resolution=20, reynolds=5e3, end_time=4.0),
+    _case("cavity-wide-kernel", "cavity of 24 x 24 with h = 4 dx, Re = 1000, 8 s", CAVITY,
+          lid_driven_cavity, slow=True, resolution=24, reynolds=1e3, h_over_dx=4.0, end_time=8.0),
+    _case("cavity-narrow-kernel", "cavity of 32 x 32 with h = 1.5 dx, Re = 1000, 8 s", CAVITY,
+          lid_driven_cavity, slow=True, resolution=32, reynolds=1e3, h_over_dx=1.5, end_time=8.0),
+    _case("cavity-float32-long", "as cavity/float32-long", CAVITY,
+          lid_driven_cavity, slow=True, resolution=50, reynolds=5e3, end_time=20.0,
+          dtype="float32"),
+    _case("vortex-jittered-re-1e6", "as taylor-green/from-jittered-re-1e6", VORTEX,
+          taylor_green, slow=True, resolution=64, reynolds=1e6, end_time=10.0,
+          arrangement=JitteredLattice()),
+    _case("thin-layer-long", "as shear-layer/thin-long", LAYER,
+          shear_layer, slow=True, resolution=128, reynolds=1e6, end_time=2.0, thickness=1.0 / 80.0),
+    _case("thin-layer-long-evened", "as shear-layer/thin-long-evened", LAYER,
+          shear_layer, slow=True, resolution=128, reynolds=1e6, end_time=2.0, thickness=1.0 / 80.0,
+          background_pressure=4000.0),
+)  # fmt: skip
