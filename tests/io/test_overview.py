@@ -18,7 +18,7 @@ def test_overview(tmp_path):
     path = random_run(tmp_path / "t.h5", count=3, dim=3, dtype="float32")
     overview = read_overview(path)
     assert (overview.scene, overview.particles, overview.dim) == ("taylor-green-3d", 4096, 3)
-    assert overview.effects[:2] == ("Continuity", "PressureForce")
+    assert overview.effects[:2] == ("KernelCorrection", "AdjointPressure")
     assert overview.mass == pytest.approx(1000.0 / 16**3)
     assert (overview.snapshots, overview.complete, overview.dtype) == (3, False, "float32")
     assert overview.step == 2 * overview.steps_per_snapshot < overview.steps

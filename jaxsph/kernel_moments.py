@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .base import Kernel
+from .kernels import Kernel
 
 _STEPS = 4000  # of the midpoint rule; six digits
 
