@@ -17,8 +17,7 @@ class ConsistentTransport(Effect):
 
     the shift-velocity terms in difference form: exact for linear fields, and nothing where the
     field is uniform. f falls to zero where ghosts hold more than a twentieth of the kernel's sum:
-    the gradient of a layer thinner than the kernel, as under a lid, is not known there, and what
-    transport by it does to the layer is worse than none (`benchmarks.consistent_walls`).
+    the gradient of a layer thinner than the kernel, as under a lid, is not known there.
 
     Needs the shift velocity, `KernelCorrection` and `DensityDiffusion` before it.
     """

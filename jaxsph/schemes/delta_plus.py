@@ -48,7 +48,7 @@ class DeltaPlus(Scheme):
 
     It makes energy from nothing where viscosity is low: disordered particles at rest speed up, by
     the shift-velocity terms everywhere and by the continuity of walls beside these
-    (`benchmarks.energy`). What reproduces the paper names it.
+    (`benchmarks.schemes`). What reproduces the paper names it.
     """
 
     def effects(self, dtype, viscosity=None, force=None, vessel=None, wall_velocity=None):
