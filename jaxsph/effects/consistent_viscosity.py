@@ -6,10 +6,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..kernel_moments import slope_moment
+from ..kernel_moments import lattice_moments, slope_moment
 from ..pairs import PairTerm
 from ..symmetric import along
 from .base import Effect, WallTerm, given, viscous_step_limit
+
+_LEAST = 0.1  # of a trace, which few neighbours leave near zero
+_LEAST_ON_LATTICE = 0.25  # 0.5 to 0.7 where neighbours are enough
 
 
 @dataclass(frozen=True)
@@ -60,11 +63,15 @@ class ConsistentViscosity(Effect):
 
     Args:
         viscosity: kinematic viscosity nu [m^2/s].
+
+    Raises:
+        ValueError: where h/dx leaves too few neighbours for that weight: t near zero on a lattice.
     """
 
     viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
 
     def step_limit(self, fluid, space):
+        _weight(space)  # a scene refuses here what it could not run
         return viscous_step_limit(self.viscosity, space)
 
     def geometry_terms(self, space):
@@ -93,16 +100,18 @@ class ConsistentViscosity(Effect):
 
     def rates(self, context, fields, sums):
         factor = 2.0 * context.space.box.dim * self.viscosity * context.fluid.reference_density
-        factor = factor / (fields["density"] * _at_least(fields["sharp_trace"]))
+        factor = factor / (fields["density"] * jnp.maximum(fields["sharp_trace"], _LEAST))
         return {"velocity": factor[:, None] * (sums["sharp_laplacian"] - fields["linear_part"])}
-
-
-def _at_least(trace):
-    """A trace that few neighbours leave near zero; n for a full neighbourhood with F = -W'/r."""
-    return jnp.maximum(trace, 0.1)
 
 
 def _weight(space) -> float:
     kernel, dim = space.kernel, space.box.dim
     ratio = slope_moment(kernel, dim, 4) / slope_moment(kernel, dim, 6)
+    h_over_dx = round(space.smoothing_length / space.spacing, 12)
+    moments = lattice_moments(kernel, dim, h_over_dx)
+    if moments["slope_2"] - moments["slope_4"] * ratio / h_over_dx**2 < _LEAST_ON_LATTICE:
+        raise ValueError(
+            f"h_over_dx: {h_over_dx:g} leaves {type(kernel).__name__} too few neighbours for "
+            "ConsistentViscosity; take 1.25 or more."
+        )
     return ratio / space.smoothing_length**2

@@ -6,7 +6,7 @@ from ..ramps import root
 from .base import Effect, WallTerm, given
 from .particle_shifting import limited, shifting_sum, shifting_term
 
-_STRENGTH = 12.0  # h |S| of a flow at U over ten spacings reaches U there
+_STRENGTH = 12.0  # at h = 2 dx: U where the flow changes by U over 24 dx
 
 
 class StrainShifting(Effect):

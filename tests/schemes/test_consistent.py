@@ -15,6 +15,7 @@ from jaxsph.effects import (
     KernelCorrection,
     StrainShifting,
 )
+from jaxsph.kernels import WendlandC4
 from jaxsph.scenes import SCENES, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph.scenes.record import scene_from_record
@@ -139,3 +140,11 @@ def test_effects_that_do_not_fit_are_refused_by_name(effects, message):
     scene = dataclasses.replace(scene, effects=effects(scene.effects))
     with pytest.raises(ValueError, match=message):
         rates_of(scene)(scene.state)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_kernel_too_narrow_for_the_viscous_weight_is_refused_when_the_scene_is_made(dim):
+    options = dict(side=12, dim=dim, periodic=True, viscosity=0.1, kernel=WendlandC4())
+    with pytest.raises(ValueError, match="h_over_dx: 1 leaves WendlandC4 too few neighbours"):
+        vessel(h_over_dx=1.0, **options)
+    vessel(h_over_dx=1.25, **options)
