@@ -75,12 +75,14 @@ class FieldAdvection(Effect):
 
 
 def acts_on_ghosts(effect: Effect) -> bool:
-    """Whether an effect gives the ghosts at walls their values."""
-    return type(effect).ghost_fields is not Effect.ghost_fields
+    """Whether an effect gives the ghosts at walls their values, or has a part in these."""
+    given = type(effect)
+    return (given.ghost_fields, given.ghost_terms) != (Effect.ghost_fields, Effect.ghost_terms)
 
 
 def advection_alone(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
-    """The advection of fields and nothing else, at walls with the ghosts' values."""
+    """The advection of fields, at walls with the ghosts' values and the forces they know of; these
+    are constant at particles that are held."""
     return (FieldAdvection(), *filter(acts_on_ghosts, effects))
 
 

@@ -28,7 +28,8 @@ WITH_GHOSTS = (
     effects.ParticleShifting(),
     effects.ShiftingTransport(),
 )
-GHOST_TERMS = effects.WallPressure(GRAVITY).ghost_terms(None) + effects.NoSlip().ghost_terms(None)
+GIVING = (GRAVITY, effects.WallPressure(), effects.NoSlip())
+GHOST_TERMS = tuple(t for e in GIVING for t in e.ghost_terms(None))
 CASES = {"2d": (2, 10), "3d": (3, 6)}
 each_case = pytest.mark.parametrize("name", CASES)
 

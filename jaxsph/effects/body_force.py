@@ -11,10 +11,11 @@ from jaxtyping import Array, Float
 
 from ..domain import Box
 from .base import Effect
+from .wall_pressure import GHOST_MOMENT
 
 
 class BodyForce(Effect):
-    """du_i/dt = b(t, x_i)."""
+    """du_i/dt = b(t, x_i); the pressure of walls balances it as well (`WallPressure`)."""
 
     def conservative_part(self, box: Box) -> BodyForce | None:
         """What of it has a `potential` in a box, periodic directions considered; None if nothing.
@@ -34,6 +35,9 @@ class BodyForce(Effect):
         self, time: Float[Array, ""], position: Float[Array, "points dim"]
     ) -> Float[Array, "points dim"]:
         """b [m/s^2] at a time [s] and at positions [m]."""
+
+    def ghost_terms(self, space):
+        return (GHOST_MOMENT,)
 
     def rates(self, context, fields, sums):
         return {"velocity": self.acceleration(context.time, fields["position"])}

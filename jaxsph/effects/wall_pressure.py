@@ -4,7 +4,6 @@ import jax.numpy as jnp
 
 from ..pairs import PairTerm
 from .base import Effect
-from .body_force import BodyForce
 
 
 def ghost_weight(pair, i, j):
@@ -24,8 +23,8 @@ def ghost_moment(pair, i, j):
 
 _REACHED = 1e-20  # of W(dx): so little that a ghost's values do not jump as particles come
 GHOST_WEIGHT = PairTerm("ghost_weight", (), ghost_weight)
+GHOST_MOMENT = PairTerm("ghost_moment", ("density",), ghost_moment)
 _MEAN = (GHOST_WEIGHT, PairTerm("ghost_pressure", ("pressure",), ghost_pressure))
-_MOMENT = PairTerm("ghost_moment", ("density",), ghost_moment)
 
 
 class WallPressure(Effect):
@@ -33,28 +32,21 @@ class WallPressure(Effect):
 
         p_i = [sum_j p_j W_ij + b . sum_j rho_j (x_i - x_j) W_ij] / sum_j W_ij,
 
-    its density from the equation of state, and its volume from that. b is the body force [m/s^2]
-    at the ghost, less the acceleration of the body that the ghost is part of where bodies are moved
-    (their eq. 27, too); without either that sum is not computed. A ghost out of reach of the fluid
-    has p = 0.
-
-    Args:
-        force: the scene's body force, if it has one.
+    its density from the equation of state, and its volume from that. b [m/s^2] is the sum of the
+    body forces that the scene lists, at the ghost, less the acceleration of the body that the ghost
+    is part of where bodies are moved (their eq. 27, too); without either its sum is not computed. A
+    ghost out of reach of the fluid has p = 0.
     """
 
-    force: BodyForce | None = None
-
     def ghost_terms(self, space):
-        return _MEAN if self.force is None else (*_MEAN, _MOMENT)
+        return _MEAN
 
     def moving_ghost_terms(self, space):
-        return (*_MEAN, _MOMENT)
+        return (*_MEAN, GHOST_MOMENT)
 
     def ghost_fields(self, context, ghosts, sums):
-        pressure = sums["ghost_pressure"]
-        accelerations = []
-        if self.force is not None:
-            accelerations.append(self.force.acceleration(context.time, ghosts["position"]))
+        pressure, position = sums["ghost_pressure"], ghosts["position"]
+        accelerations = [f.acceleration(context.time, position) for f in context.forces]
         if "wall_acceleration" in ghosts:
             accelerations.append(-ghosts["wall_acceleration"])
         for acceleration in accelerations:

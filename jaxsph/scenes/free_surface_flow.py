@@ -43,7 +43,7 @@ def free_surface_effects(
     walls: tuple[Effect, ...] = ()
     if vessel is not None:
         slip = FreeSlip() if wall_velocity is None else wall_velocity
-        walls = (WallPressure(force), slip, WallRepulsion(vessel))
+        walls = (WallPressure(), slip, WallRepulsion(vessel))
     return (
         Continuity(),
         PressureForce(),

@@ -61,4 +61,4 @@ class DeltaPlus(Scheme):
         if vessel is None:
             return effects
         slip = NoSlip() if wall_velocity is None else wall_velocity
-        return (*effects, WallPressure(force), slip, WallRepulsion(vessel))
+        return (*effects, WallPressure(), slip, WallRepulsion(vessel))

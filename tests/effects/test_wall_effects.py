@@ -23,6 +23,7 @@ from jaxsph import (
 )
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.effects import (
+    BodyForce,
     Context,
     Continuity,
     DensityDiffusion,
@@ -109,7 +110,7 @@ def rates(state, walls, periodic=CHANNEL, slip=None, gravity=0.0 * DOWN, effects
     if effects is None:
         effects = (Continuity(), PressureForce(), LaminarViscosity(NU), DensityDiffusion(0.1))
         effects += (ParticleShifting(), ShiftingTransport())
-    effects += (Gravity(gravity), WallPressure(Gravity(gravity)), slip or NoSlip())
+    effects += (Gravity(gravity), WallPressure(), slip or NoSlip())
     functional = SPHFunctional(effects, FLUID, RHO0 * DX**2, space, walls)
     return rates_of(functional, state, wall_list(space, state.position, walls))
 
@@ -155,7 +156,8 @@ def ghosts_by(effects, position, walls, periodic=CHANNEL, blind=False, **fields)
     pairs = wall_list(space, position, walls).wall
     terms = tuple(t for e in effects for t in e.ghost_terms(space))
     sums = ghost_sums(terms, state, ghosts, space, pairs)
-    context = Context(jnp.asarray(0.0), FLUID, jnp.asarray(RHO0 * DX**2), space)
+    forces = tuple(e for e in effects if isinstance(e, BodyForce))
+    context = Context(jnp.asarray(0.0), FLUID, jnp.asarray(RHO0 * DX**2), space, forces=forces)
     for effect in effects:
         ghosts = ghosts | effect.ghost_fields(context, ghosts, sums)
     # at the rim of the support weights are as good as zero: these ghosts are of neither kind
@@ -171,7 +173,7 @@ def ghosts_by(effects, position, walls, periodic=CHANNEL, blind=False, **fields)
 def test_a_ghost_continues_a_hydrostatic_pressure_exactly(arrange):
     """p_j + rho0 b . (x_i - x_j) is p(x_i) for each particle j alone, so for their mean, too."""
     x, b, walls = arrange(), jnp.asarray([0.3, -1.0]), make_walls(CLOSED)
-    found = ghosts_by((WallPressure(Gravity(b)),), x, walls, CLOSED, pressure=RHO0 * (2.0 + x @ b))
+    found = ghosts_by((Gravity(b), WallPressure()), x, walls, CLOSED, pressure=RHO0 * (2.0 + x @ b))
     exact = RHO0 * (2.0 + found["position"] @ b)
     np.testing.assert_allclose(found["pressure"], exact, rtol=ROUND_OFF)
     np.testing.assert_allclose(found["density"], RHO0 + exact / C0**2, rtol=ROUND_OFF)
@@ -183,7 +185,7 @@ def test_a_ghost_in_a_compressed_fluid_is_off_by_the_compression():
     pressure = RHO0 * (1.0 - x[:, 1])
     density = FLUID.density(pressure)
     found = ghosts_by(
-        (WallPressure(Gravity(DOWN)),), x, walls, CLOSED, pressure=pressure, density=density
+        (Gravity(DOWN), WallPressure()), x, walls, CLOSED, pressure=pressure, density=density
     )
     error = np.abs(found["pressure"] - RHO0 * (1.0 - found["position"][:, 1]))
     # rho_j - rho0 <= rho0 g H / c0^2 = 1 percent of rho0, over at most 4 dx; 2.0 Pa measured
@@ -421,7 +423,7 @@ def test_ghosts_out_of_reach_are_at_rest_without_pressure_and_without_nan():
     x = jnp.asarray([[0.5, 0.5], [0.55, 0.5], [0.95, 0.5]])  # two in mid-fluid, one at a wall
     walls = make_walls(CLOSED)
     velocity = jnp.asarray([[1.0, 2.0], [0.0, 0.0], [1.0, 1.0]])
-    effects = (WallPressure(Gravity(DOWN)), NoSlip())
+    effects = (Gravity(DOWN), WallPressure(), NoSlip())
     found = ghosts_by(effects, x, walls, CLOSED, blind=True, velocity=velocity)
     assert len(walls.position) > len(found["position"]) > 0.5 * len(walls.position)
     np.testing.assert_array_equal(found["pressure"], 0.0)
@@ -438,7 +440,7 @@ def rates_and_slopes(state, walls):
     space = make_space(CLOSED)
     neighbors = wall_list(space, state.position, walls)
     effects = (Continuity(), PressureForce(), LaminarViscosity(NU))
-    effects += (WallPressure(Gravity(DOWN)), NoSlip())
+    effects += (Gravity(DOWN), WallPressure(), NoSlip())
     functional = SPHFunctional(effects, FLUID, RHO0 * DX**2, space, walls)
 
     @jax.jit

@@ -92,7 +92,7 @@ def scene(walls, slip, force=None, repelling=VESSEL, time_step=5e-3, velocity=(0
         DensityDiffusion(jnp.asarray(0.1)),
         ParticleShifting(),
         *(() if force is None else (force,)),
-        WallPressure(force),
+        WallPressure(),
         slip,
         WallRepulsion(repelling),
     )
