@@ -34,7 +34,7 @@ from jaxsph.scenes.elliptic_drop import semi_axes
 from jaxsph.scenes.gresho_vortex import gresho_velocity
 from jaxsph.scenes.piston_wave_maker import wave_height, wave_number
 from jaxsph.scenes.standing_wave import damping
-from jaxsph.schemes import DeltaPlus
+from jaxsph.schemes import SCHEMES, Scheme
 
 from .measure import format_rows, number, progress, read_json, tell, write_json
 from .references.dam_break import (
@@ -71,13 +71,16 @@ def _command(argv) -> int:
     options = _parser().parse_args(argv)
     check_target(options.json, overwrite=True)
     rows = (read_json(options.json) or {}).get("rows", [])
-    done = {(row["scene"], row["resolution"]) for row in rows}
+    for row in rows:
+        row.setdefault("scheme", "delta-plus")  # there was no other
+    done = {(row["scene"], row["resolution"], row["scheme"]) for row in rows}
     with jax.enable_x64(True):
         for name in options.scenes:
-            for resolution in options.resolutions or RESOLUTIONS[name]:
-                if (name, resolution) not in done:
-                    tell(f"{name}, resolution {resolution}")
-                    rows.append(run(name, resolution))
+            sizes, schemes = options.resolutions or RESOLUTIONS[name], _schemes(name, options)
+            for key in ((name, size, scheme) for size in sizes for scheme in schemes):
+                if key not in done:
+                    tell("{}, resolution {}, {}".format(*key))
+                    rows.append(run(*key))
                     write_json(options.json, {"rows": rows, **environment()})
     print(_table(rows))
     return 0
@@ -91,18 +94,31 @@ def _parser() -> argparse.ArgumentParser:
     names = tuple(RESOLUTIONS)
     add("--scenes", nargs="+", choices=names, default=names, help="default: all")
     add("--resolutions", nargs="+", type=positive_int, metavar="N", help="default: two per scene")
+    add("--schemes", nargs="+", choices=tuple(SCHEMES), default=tuple(SCHEMES),
+        help="default: all that a scene has")  # fmt: skip
     add("--json", type=Path, metavar="FILE", default=RESULTS, help=f"default: {RESULTS}")
     return parser
 
 
-def run(name: str, resolution: int) -> dict[str, Any]:
+def _make(name: str) -> Callable[..., Scene]:
+    return SCENES.get(name, _impact_scene)
+
+
+def _schemes(name: str, options: argparse.Namespace) -> tuple[str, ...]:
+    """Those asked for; a drop under surface tension has effects of its own, as delta-plus has."""
+    free = "scheme" in inspect.signature(_make(name)).parameters
+    return options.schemes if free else ("delta-plus",)
+
+
+def run(name: str, resolution: int, scheme: str) -> dict[str, Any]:
     """A full run of a scene and its row."""
-    make = SCENES.get(name, _impact_scene)
-    schemed = {"scheme": DeltaPlus()} if "scheme" in inspect.signature(make).parameters else {}
-    scene = make(resolution=resolution, **schemed)
+    make = _make(name)
+    chosen = {"scheme": SCHEMES[scheme]} if "scheme" in inspect.signature(make).parameters else {}
+    scene = make(resolution=resolution, **chosen)
     row = {
         "scene": name,
         "resolution": resolution,
+        "scheme": scheme,
         "particles": len(scene.state.position),
         "effects": [effect.name for effect in scene.effects],
         "steps": scene.steps,
@@ -164,7 +180,7 @@ def _dam_break(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
-def _impact_scene(resolution: int) -> Scene:
+def _impact_scene(resolution: int, scheme: Scheme) -> Scene:
     """The dam break of Buchner (2002), water that hits a wall with a pressure sensor in it."""
     tank = tuple(IMPACT_HEIGHT * length for length in SENSOR_TANK)
     end = 5.4 * math.sqrt(IMPACT_HEIGHT / GRAVITY)
@@ -177,6 +193,7 @@ def _impact_scene(resolution: int) -> Scene:
         tank=tank,
         end_time=end,
         time_step=end / steps,
+        scheme=scheme,
         wall_velocity=FreeSlip(),  # a tongue that sticks to the floor comes late, see `dam_break`
     )
     return replace(scene, steps_per_snapshot=10)
@@ -352,13 +369,15 @@ MEASURES: dict[str, Callable[[Scene, Trajectory], dict[str, Any]]] = {
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
-    header = ("scene", "resolution", "particles", "error [%]", "of", "run [s]", "density / rho0")
+    header = ("scene", "resolution", "scheme", "particles", "error [%]", "of", "run [s]")
+    header = (*header, "density / rho0")
     return format_rows(
         header,
         [
             (
                 row["scene"],
                 str(row["resolution"]),
+                row["scheme"],
                 str(row["particles"]),
                 number(row.get("error_percent")),
                 row["fault"] or row["measure"],

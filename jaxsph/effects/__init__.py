@@ -1,5 +1,6 @@
 """Effects: the parts of the physics that a scene composes, one a file."""
 
+from .adjoint_continuity import AdjointContinuity as AdjointContinuity
 from .adjoint_pressure import AdjointPressure as AdjointPressure
 from .artificial_viscosity import ArtificialViscosity as ArtificialViscosity
 from .background_pressure import BackgroundPressure as BackgroundPressure
@@ -19,6 +20,7 @@ from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
 from .kernel_correction import KernelCorrection as KernelCorrection
 from .laminar_viscosity import LaminarViscosity as LaminarViscosity
 from .local_no_slip import LocalNoSlip as LocalNoSlip
+from .pair_repulsion import PairRepulsion as PairRepulsion
 from .particle_shifting import ParticleShifting as ParticleShifting
 from .pressure_force import PressureForce as PressureForce
 from .shifting_transport import ShiftingTransport as ShiftingTransport
@@ -27,6 +29,7 @@ from .surface_diffusion import SurfaceDiffusion as SurfaceDiffusion
 from .surface_shifting import SurfaceShifting as SurfaceShifting
 from .surface_tension import SurfaceTension as SurfaceTension
 from .tensile_control import TensileControl as TensileControl
+from .velocity_diffusion import VelocityDiffusion as VelocityDiffusion
 from .wall_pressure import WallPressure as WallPressure
 from .wall_repulsion import WallRepulsion as WallRepulsion
 from .wall_velocity import FixedWallVelocity as FixedWallVelocity

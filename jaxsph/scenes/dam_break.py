@@ -8,9 +8,9 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import ArtificialViscosity, Effect, Gravity, NoSlip
 from ..kernels import Kernel
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import free_surface_effects
 from .scales import Scale
 from .scene import Scene
 
@@ -37,6 +37,7 @@ def dam_break(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    scheme: Scheme | None = None,
     wall_velocity: Effect | None = None,
     dtype=None,
 ) -> Scene:
@@ -59,6 +60,7 @@ def dam_break(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         wall_velocity: how viscosity sees the walls; `NoSlip()` if none is given, which holds up a
             tongue of a few particles' thickness; `FreeSlip()` does not.
         dtype: float64 or float32; JAX's default if none is given.
@@ -66,6 +68,7 @@ def dam_break(
     Raises:
         ValueError: for a column that does not fit its tank, a resolution or a step out of range.
     """
+    scheme = Consistent() if scheme is None else scheme
     column, tank = (tuple(map(float, pair)) for pair in (column, tank))
     positive(alpha=alpha, column=min(column), **{"t-end": end_time})
     if column[0] >= tank[0] or column[1] >= tank[1]:
@@ -77,7 +80,7 @@ def dam_break(
     vessel, height = BoxRegion((0.0, 0.0), tank), column[1]
 
     def effects(dtype):
-        return free_surface_effects(
+        return scheme.free_surface_effects(
             dtype,
             ArtificialViscosity(jnp.asarray(alpha, dtype)),
             force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
@@ -103,6 +106,7 @@ def dam_break(
         dtype=dtype,
         parameters={
             "scale": scale,
+            "scheme": type(scheme).__name__,
             "column": column,
             "tank": tank,
             "alpha": alpha,

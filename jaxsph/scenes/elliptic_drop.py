@@ -10,9 +10,9 @@ from ..arrangements import Arrangement, Rings
 from ..domain import Box
 from ..effects import ArtificialViscosity, CentralForce
 from ..kernels import Kernel
+from ..schemes import Consistent, Scheme
 from ..walls import BallRegion
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import free_surface_effects
 from .scales import Scale
 from .scene import Scene
 
@@ -59,6 +59,7 @@ def elliptic_drop(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    scheme: Scheme | None = None,
     dtype=None,
 ) -> Scene:
     """A round drop of 1 m radius that starts with u = (x, -y) 1/s and stretches to an ellipse.
@@ -78,11 +79,13 @@ def elliptic_drop(
         arrangement: how particles start; rings if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
         ValueError: for a pull, a resolution or a step out of range.
     """
+    scheme = Consistent() if scheme is None else scheme
     positive(alpha=alpha, **{"t-end": end_time})
     if not pull >= 0.0:
         raise ValueError(f"pull: zero or positive, got {pull:g} rad/s.")
@@ -91,7 +94,7 @@ def elliptic_drop(
     def effects(dtype):
         pulled = CentralForce(jnp.asarray(pull, dtype), (0.0, 0.0)) if pull > 0.0 else None
         viscosity = ArtificialViscosity(jnp.asarray(alpha, dtype))
-        return free_surface_effects(dtype, viscosity, force=pulled)
+        return scheme.free_surface_effects(dtype, viscosity, force=pulled)
 
     return composed(
         "elliptic-drop",
@@ -109,5 +112,5 @@ def elliptic_drop(
         arrangement=Rings() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "pull": pull, "alpha": alpha},
+        parameters={"scale": scale, "pull": pull, "alpha": alpha, "scheme": type(scheme).__name__},
     )

@@ -14,9 +14,9 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import ArtificialViscosity, Gravity
 from ..kernels import Kernel
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, MovingBody, Walls
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import free_surface_effects
 from .scales import Scale
 from .scene import Scene
 
@@ -81,6 +81,7 @@ def piston_wave_maker(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    scheme: Scheme | None = None,
     dtype=None,
 ) -> Scene:
     """Water 0.3 m deep in a tank, its left wall a piston 3.3 m from the right one.
@@ -102,11 +103,13 @@ def piston_wave_maker(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
         ValueError: for a stroke, a period, a resolution or a step out of range.
     """
+    scheme = Consistent() if scheme is None else scheme
     positive(stroke=stroke, period=period, alpha=alpha, **{"t-end": end_time})
     if stroke > 0.1:
         raise ValueError(f"stroke: at most 0.1 m, or waves break at the piston; got {stroke:g} m.")
@@ -122,7 +125,7 @@ def piston_wave_maker(
         return Walls.around(tank, space, bodies=(MovingBody(piston, PistonStroke(stroke, period)),))
 
     def effects(dtype):
-        return free_surface_effects(
+        return scheme.free_surface_effects(
             dtype,
             ArtificialViscosity(jnp.asarray(alpha, dtype)),
             force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
@@ -144,5 +147,11 @@ def piston_wave_maker(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "stroke": stroke, "period": period, "alpha": alpha},
+        parameters={
+            "scale": scale,
+            "stroke": stroke,
+            "period": period,
+            "alpha": alpha,
+            "scheme": type(scheme).__name__,
+        },
     )

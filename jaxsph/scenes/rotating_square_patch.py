@@ -7,9 +7,9 @@ import numpy as np
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..kernels import Kernel
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import free_surface_effects
 from .scales import Scale
 from .scene import Scene
 
@@ -57,6 +57,7 @@ def rotating_square_patch(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    scheme: Scheme | None = None,
     dtype=None,
 ) -> Scene:
     """A square of fluid, 1 m wide, that turns as a solid would at 1 rad/s (Colagrossi 2005).
@@ -73,16 +74,18 @@ def rotating_square_patch(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
         ValueError: for an end time, a resolution or a step out of range.
     """
+    scheme = Consistent() if scheme is None else scheme
     positive(**{"t-end": end_time})
     half = 0.5 * SIDE
     return composed(
         "rotating-square-patch",
-        effects=free_surface_effects,
+        effects=scheme.free_surface_effects,
         box=Box((-REACH, -REACH), (REACH, REACH), (False, False)),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
@@ -96,5 +99,5 @@ def rotating_square_patch(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale},
+        parameters={"scale": scale, "scheme": type(scheme).__name__},
     )

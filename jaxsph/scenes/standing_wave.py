@@ -11,9 +11,9 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import Gravity, LaminarViscosity
 from ..kernels import Kernel
+from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
-from .free_surface_flow import free_surface_effects
 from .scales import Scale
 from .scene import Scene
 
@@ -60,6 +60,7 @@ def standing_wave(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
+    scheme: Scheme | None = None,
     dtype=None,
 ) -> Scene:
     """A standing wave in a basin 2 m long, periodic, and 1 m deep (Antuono et al. 2011).
@@ -82,11 +83,13 @@ def standing_wave(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         mach: Mach number U / c0.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         dtype: float64 or float32; JAX's default if none is given.
 
     Raises:
         ValueError: for a Reynolds number or an amplitude, a resolution or a step out of range.
     """
+    scheme = Consistent() if scheme is None else scheme
     positive(reynolds=reynolds, amplitude=amplitude, **{"t-end": end_time})
     if amplitude > 0.2 * DEPTH:
         raise ValueError(f"amplitude: at most 0.2 m for a linear wave, got {amplitude:g} m.")
@@ -99,7 +102,7 @@ def standing_wave(
         return speed * jnp.stack([-jnp.sin(kx) * jnp.cosh(ky), jnp.cos(kx) * jnp.sinh(ky)], axis=1)
 
     def effects(dtype):
-        return free_surface_effects(
+        return scheme.free_surface_effects(
             dtype,
             LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)),
             force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
@@ -123,5 +126,10 @@ def standing_wave(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds, "amplitude": amplitude},
+        parameters={
+            "scale": scale,
+            "reynolds": reynolds,
+            "amplitude": amplitude,
+            "scheme": type(scheme).__name__,
+        },
     )

@@ -11,7 +11,7 @@ from ..walls import Region
 
 @dataclass(frozen=True)
 class Scheme(ABC):
-    """The effects that discretise a fluid that fills its box or its vessel."""
+    """The effects that discretise a flow."""
 
     @abstractmethod
     def effects(
@@ -22,7 +22,7 @@ class Scheme(ABC):
         vessel: Region | None = None,
         wall_velocity: Effect | None = None,
     ) -> tuple[Effect, ...]:
-        """The effects of a scene.
+        """The effects of a fluid that fills its box or its vessel.
 
         Args:
             dtype: of coefficients.
@@ -30,4 +30,23 @@ class Scheme(ABC):
             force: body force, if there is one.
             vessel: where fluid may be, if there are walls.
             wall_velocity: how viscosity sees these; the scheme's own no-slip if none is given.
+        """
+
+    @abstractmethod
+    def free_surface_effects(
+        self,
+        dtype,
+        *more: Effect,
+        force: BodyForce | None = None,
+        vessel: Region | None = None,
+        wall_velocity: Effect | None = None,
+    ) -> tuple[Effect, ...]:
+        """The effects of a flow with a free surface.
+
+        Args:
+            dtype: of coefficients.
+            more: viscosity, surface tension.
+            force: body force, if there is one.
+            vessel: where fluid may be, if there are walls.
+            wall_velocity: how viscosity sees these; `FreeSlip()` if none is given.
         """

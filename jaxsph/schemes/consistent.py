@@ -7,18 +7,26 @@ from typing import final
 
 import jax.numpy as jnp
 
+from .. import effects as known
 from ..effects import (
+    AdjointContinuity,
     AdjointPressure,
     ConsistentTransport,
     ConsistentViscosity,
     DensityDiffusion,
     KernelCorrection,
     LocalNoSlip,
+    PairRepulsion,
+    PressureForce,
     StrainShifting,
+    VelocityDiffusion,
+    WallPressure,
     WallRepulsion,
 )
 from .base import Scheme
-from .delta_plus import DELTA
+from .delta_plus import DELTA, free_walls
+
+VELOCITY_DELTA = 0.05  # of the velocity diffusion at free surfaces
 
 
 @final
@@ -27,8 +35,9 @@ class Consistent(Scheme):
     """Pressure and continuity adjoint to each other, all other sums exact for linear fields.
 
     A fluid at rest stays at rest whatever its viscosity and however disordered its particles are,
-    and what sound and waves carry is never more than they were given. For flows without a free
-    surface, between walls that rest or slide along themselves.
+    and what sound and waves carry is never more than they were given. Between walls that rest or
+    slide along themselves; with a free surface bodies may be moved through the fluid, too, and the
+    sums are the plain ones, as support is cut there.
     """
 
     def effects(self, dtype, viscosity=None, force=None, vessel=None, wall_velocity=None):
@@ -47,6 +56,28 @@ class Consistent(Scheme):
             DensityDiffusion(jnp.asarray(DELTA, dtype)),
             StrainShifting(),
             ConsistentTransport(),
+            PairRepulsion(),
             *driven,
+            *walls,
+        )
+
+    def free_surface_effects(self, dtype, *more, force=None, vessel=None, wall_velocity=None):
+        """Plain pairwise sums, with a continuity of walls that does not pump."""
+        walls = () if vessel is None else (WallPressure(), *free_walls(vessel, wall_velocity))
+        return (
+            KernelCorrection(),
+            AdjointContinuity(),
+            PressureForce(),
+            DensityDiffusion(jnp.asarray(DELTA, dtype)),
+            StrainShifting(),
+            known.FreeSurface(),
+            VelocityDiffusion(jnp.asarray(VELOCITY_DELTA, dtype)),
+            known.SurfaceShifting(),
+            known.SurfaceDiffusion(),
+            known.TensileControl(),
+            ConsistentTransport(),
+            PairRepulsion(),
+            *more,
+            *(() if force is None else (force,)),
             *walls,
         )

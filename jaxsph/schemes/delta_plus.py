@@ -7,6 +7,7 @@ from typing import final
 
 import jax.numpy as jnp
 
+from .. import effects as known
 from ..effects import (
     Continuity,
     DensityDiffusion,
@@ -62,3 +63,25 @@ class DeltaPlus(Scheme):
             return effects
         slip = NoSlip() if wall_velocity is None else wall_velocity
         return (*effects, WallPressure(), slip, WallRepulsion(vessel))
+
+    def free_surface_effects(self, dtype, *more, force=None, vessel=None, wall_velocity=None):
+        """The consistent delta-plus scheme (Sun et al. 2019)."""
+        # looked up when called: what other flows are made of does not hang on these
+        bulk = delta_plus(dtype)
+        walls = () if vessel is None else (WallPressure(), *free_walls(vessel, wall_velocity))
+        return (
+            *bulk[:-1],
+            known.FreeSurface(),
+            known.SurfaceShifting(),
+            known.SurfaceDiffusion(),
+            known.TensileControl(),
+            bulk[-1],
+            *more,
+            *(() if force is None else (force,)),
+            *walls,
+        )
+
+
+def free_walls(vessel, wall_velocity) -> tuple[Effect, ...]:
+    """Walls of a flow with a free surface, slippery if nothing else is asked."""
+    return (known.FreeSlip() if wall_velocity is None else wall_velocity, WallRepulsion(vessel))

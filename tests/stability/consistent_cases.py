@@ -9,10 +9,32 @@ import equinox as eqx
 import jax
 
 from jaxsph.arrangements import JitteredLattice
-from jaxsph.scenes import Scene, hydrostatic_tank, lid_driven_cavity, shear_layer, taylor_green
+from jaxsph.scenes import (
+    Scene,
+    dam_break,
+    hydrostatic_tank,
+    lid_driven_cavity,
+    piston_wave_maker,
+    rotating_square_patch,
+    shear_layer,
+    standing_wave,
+    taylor_green,
+)
 from jaxsph.schemes import Consistent
 
-from .bounds import CAVITY, DECAY, DENSITY, LAYER, TANK, VORTEX, WALLS
+from .bounds import (
+    CAVITY,
+    DECAY,
+    DENSITY,
+    LAYER,
+    PATCH,
+    POOL,
+    PUSHED,
+    SPLASH,
+    TANK,
+    VORTEX,
+    WALLS,
+)
 from .full_cases import interval
 from .judge import Case, Run
 
@@ -76,4 +98,21 @@ CONSISTENT = (
           shear_layer, slow=True, wrong=_DEEP, resolution=128, reynolds=1e6, end_time=2.0,
           thickness=1.0 / 80.0,
           background_pressure=4000.0),
+    _case("thin-layer-long-stiff", "as shear-layer/thin-long-stiff", LAYER,
+          shear_layer, slow=True, resolution=128, reynolds=1e6, end_time=2.0,
+          thickness=1.0 / 80.0, background_pressure=4000.0, mach=0.05, time_step=6.25e-4),
+    _case("dam-break-corner", "a = 8 dx, into the corner and back", SPLASH,
+          dam_break, resolution=40, end_time=0.5),
+    *(
+        _case(f"dam-break-{along}-to-rest", f"{along} particles along the tank, 8 s", SPLASH,
+              dam_break, slow=True, resolution=along, end_time=8.0)
+        for along in (30, 40, 50, 70)
+    ),
+    _case("standing-wave", "32 dx long, 3 s", POOL, standing_wave, resolution=32, end_time=3.0),
+    _case("standing-wave-long", "40 dx long, 12 s", POOL, standing_wave, slow=True, resolution=40,
+          end_time=12.0),
+    _case("piston", "2 periods of a piston wave maker, water 7 dx deep", PUSHED,
+          piston_wave_maker, slow=True, resolution=80, end_time=2.4),
+    _case("patch", "50 dx wide, omega t = 4", PATCH, rotating_square_patch, slow=True,
+          resolution=50, end_time=4.0),
 )  # fmt: skip

@@ -1,0 +1,108 @@
+"""The consistent scheme at free surfaces: walls that do not pump, noise that dies, pairs apart."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from benchmarks.free_surfaces import still_water
+from jaxsph import run_scene
+from jaxsph.effects import (
+    AdjointContinuity,
+    FreeSlip,
+    KernelCorrection,
+    PairRepulsion,
+    PressureForce,
+    VelocityDiffusion,
+    WallPressure,
+)
+from jaxsph.effects.adjoint_continuity import moving_ghost_flux, moving_wall_divergence
+from jaxsph.scenes import dam_break
+from jaxsph.schemes import Consistent
+from jaxsph.vector import Vector
+
+from .test_energy import CORNERED, energy_rate
+from .vessels import disturbed, rates_of, vessel
+
+WALLS = (AdjointContinuity(), PressureForce(), WallPressure(), FreeSlip())
+
+
+def of(effects, **options):
+    return dataclasses.replace(vessel(**options), effects=effects)
+
+
+def half_full(scene):
+    """The lower half of its particles, which have a free surface."""
+    low = np.asarray(scene.state.position[:, -1] < scene.space.box.upper[-1] / 2)
+    return dataclasses.replace(scene, state=jax.tree.map(lambda a: a[low], scene.state))
+
+
+@pytest.mark.parametrize(
+    "options", [dict(side=10), dict(side=14, region=CORNERED), dict(side=6, dim=3)], ids=str
+)
+def test_walls_and_free_surface_only_exchange_energy(options):
+    scene = half_full(of(WALLS, **options))
+    assert abs(energy_rate(scene, disturbed(scene))) < 1e-13  # round-off
+
+
+def test_a_ghost_gathers_the_velocity_relative_to_its_wall():
+    pair = SimpleNamespace(gradient=Vector((0.3, 0.7)), kernel=1.0)
+    row = SimpleNamespace(
+        velocity=Vector((1.0, 2.0)), wall_velocity=Vector((1.0, 2.0)), gathered_flux=0.0,
+        volume=1.0,
+    )  # fmt: skip
+    assert moving_ghost_flux(pair, row, row) == 0.0
+    assert moving_wall_divergence(pair, row, row) == 0.0
+
+
+def test_velocity_diffusion_leaves_linear_fields_alone():
+    effects = (KernelCorrection(), VelocityDiffusion(0.1))
+    scene = half_full(of((*effects, FreeSlip()), side=12, region=None))
+    scene = dataclasses.replace(scene, walls=None, effects=effects)
+    slope = jnp.asarray([[0.3, -1.2], [0.7, 0.4]])
+    state = dataclasses.replace(scene.state, velocity=scene.state.position @ slope.T + 2.0)
+    assert jnp.abs(rates_of(scene)(state).velocity).max() < 1e-12  # of 10 / s times some m/s
+    noisy = disturbed(scene)
+    found = rates_of(scene)(noisy)
+    size = jnp.abs(found.velocity).sum()
+    assert jnp.abs(found.velocity.sum(axis=0)).max() < 1e-13 * size
+    turning = noisy.position[:, 0] * found.velocity[:, 1]
+    turning = turning - noisy.position[:, 1] * found.velocity[:, 0]
+    assert jnp.abs(turning.sum()) < 1e-12 * jnp.abs(turning).sum()
+    assert (noisy.velocity * found.velocity).sum() < 0.0
+
+
+def test_pair_repulsion_has_a_potential_and_spares_even_particles():
+    scene = of((PairRepulsion(),), side=10, periodic=True)
+    assert jnp.abs(rates_of(scene)(scene.state).velocity).max() == 0.0
+    position = scene.state.position.at[3].set(scene.state.position[40] + jnp.asarray([0.2, 0.1]))
+    close = dataclasses.replace(scene, state=dataclasses.replace(scene.state, position=position))
+    found = rates_of(close)(close.state).velocity
+    reach, strength = 0.4, 0.2 * 100.0
+
+    def potential(x):
+        apart = jnp.sqrt(jnp.sum((x - position[40]) ** 2))
+        return strength * reach / 3.0 * (1.0 - apart / reach) ** 3
+
+    np.testing.assert_allclose(found[3], -jax.grad(potential)(position[3]), rtol=1e-12)
+    np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_still_water_stays_level():
+    found = run_scene(still_water(2, 8, end=6.0))
+    level = 2.0 * found.position[:, :, 1].mean(axis=1)
+    assert np.abs(level - 1.0).max() < 0.003
+    speed = np.linalg.norm(found.velocity, axis=2).max(axis=1)
+    assert speed[-5:].max() < 0.02  # of (g H)^(1/2), with an inviscid fluid
+
+
+@pytest.mark.parametrize(
+    "along",
+    [40, pytest.param(50, marks=pytest.mark.slow), pytest.param(30, marks=pytest.mark.slow)],
+)
+def test_a_dam_break_passes_the_corner_at_any_resolution(along):
+    found = run_scene(dam_break(along, end_time=0.5, scheme=Consistent()))
+    assert np.abs(found.density / 1000.0 - 1.0).max() < 0.06
