@@ -71,8 +71,8 @@ class Scene(eqx.Module):
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
-                "(the least of 1.5 h/c0, 0.125 h^2/nu and the limits of other effects); choose one "
-                "below it."
+                "(the least of 1.5 h/c0, 0.125 h^2/nu, 2.1 dx/c0 at walls and the limits of other "
+                "effects); choose one below it."
             )
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
