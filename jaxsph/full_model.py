@@ -11,6 +11,7 @@ from jax import lax
 from .effects import Effect
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
+from .likely_cause import likely_cause
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
 from .particles import ParticleState
 from .trajectory import Snapshot
@@ -99,6 +100,13 @@ class FullModel(Model):
     def with_effect(self, effect: Effect):
         """The same with other coefficients of one effect; see `SPHFunctional.with_effect`."""
         return dataclasses.replace(self, functional=self.functional.with_effect(effect))
+
+    def likely_cause(self, fault, state, time_step):
+        here = self.at(jnp.asarray(int(fault.step) * time_step, state.position.dtype))
+        limit = float(here.step_limit(state, jnp.zeros((), state.position.dtype)))
+        of = here.functional
+        particle = int(fault.particle)
+        return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())

@@ -13,7 +13,7 @@ from .effects import BodyForce, Context, Effect
 from .fluid import Fluid
 from .neighbors import VerletList, WallList
 from .pairs import Space, pair_sum
-from .particles import ParticleState
+from .particles import ParticleState, in_dtype
 from .wall_sums import ghost_sums, wall_sums
 from .walls import Walls
 
@@ -43,7 +43,7 @@ class SPHFunctional(eqx.Module):
         """The same with an effect in place of its one of that kind: other coefficients, say.
 
         Raises:
-            ValueError: if it has none of that kind.
+            ValueError: if it has none of that kind, or several.
 
         Examples:
             >>> import jaxsph
@@ -56,6 +56,13 @@ class SPHFunctional(eqx.Module):
         if type(effect) not in kinds:
             names = ", ".join(e.name for e in self.effects)
             raise ValueError(f"effect: there is no {effect.name} among {names}; name one of these.")
+        if kinds.count(type(effect)) > 1:
+            places = [k for k, kind in enumerate(kinds) if kind is type(effect)]
+            raise ValueError(
+                f"effect: there are {len(places)} of the kind {effect.name}, numbers {places} of "
+                "`effects`; give a new tuple by `dataclasses.replace(functional, effects=...)`."
+            )
+        effect = in_dtype(effect, self.mass.dtype)
         place = kinds.index(type(effect))
         return replace(self, effects=(*self.effects[:place], effect, *self.effects[place + 1 :]))
 

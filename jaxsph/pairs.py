@@ -15,6 +15,7 @@ each. The primitive carries its own rules:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -91,10 +92,29 @@ class Space:
     smoothing_length: float
     spacing: float
 
+    def __post_init__(self):
+        for name in ("smoothing_length", "spacing"):  # not numpy's, whose dtype would spread
+            object.__setattr__(self, name, float(getattr(self, name)))
+
     @property
     def support(self) -> float:
         """Radius of the kernel's support [m]."""
         return self.kernel.support * self.smoothing_length
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Cells of the lattice along each side of the box, whole numbers of about dx."""
+        return tuple(max(1, round(length / self.spacing)) for length in self.box.lengths)
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """Sides of such a cell [m]: dx where it divides the box."""
+        return tuple(b / count for b, count in zip(self.box.lengths, self.counts, strict=True))
+
+    @property
+    def cell_volume(self) -> float:
+        """Volume of such a cell [m^n]."""
+        return math.prod(self.steps)
 
     def check(self) -> None:
         """Raise a ValueError if a periodic box is too small for the kernel's support."""

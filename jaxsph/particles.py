@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 
@@ -12,3 +17,14 @@ class ParticleState(eqx.Module):
     position: Float[Array, "particles dim"]
     velocity: Float[Array, "particles dim"]
     density: Float[Array, " particles"]
+
+
+def in_dtype(tree: Any, dtype) -> Any:
+    """A pytree with all its real numbers, those of numpy too, as arrays of one precision."""
+
+    def cast(leaf):
+        array = isinstance(leaf, jax.Array | np.ndarray | np.generic)
+        real = array and jnp.issubdtype(leaf.dtype, jnp.floating)
+        return jnp.asarray(leaf, dtype) if real else leaf
+
+    return jax.tree.map(cast, tree)

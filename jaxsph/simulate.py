@@ -105,8 +105,8 @@ def simulate(
         if recorder is not None:
             recorder.append(step, step * time_step, snapshot)
 
-    def _failed(fault):
-        error = SimulationError(fault, time_step)
+    def _failed(fault, likely=None):
+        error = SimulationError(fault, time_step, likely)
         error.trajectory = trajectory() if records else None
         return error
 
@@ -154,7 +154,7 @@ def simulate(
                 enlarged_at.append(int(fault.step))
                 continue
         if int(fault.code) != FaultCode.NONE:
-            raise _failed(fault)
+            raise _failed(fault, model.likely_cause(fault, new, time_step))
         run_seconds += elapsed
         state, step = new, step + steps_per_snapshot
         record(step, snapshot)

@@ -14,12 +14,14 @@ from .base import Arrangement
 @final
 @dataclass(frozen=True)
 class Lattice(Arrangement):
-    """Particles at the centres of equal squares or cubes of side dx."""
+    """Particles at the centres of equal squares or cubes of side dx.
+
+    Where dx does not divide a side of the box, they are as much longer or shorter as a whole number
+    of them needs (`Space.steps`).
+    """
 
     def positions(self, space):
-        axes = []
-        for lower, length in zip(space.box.lower, space.box.lengths, strict=True):
-            count = round(length / space.spacing)
-            axes.append(lower + (np.arange(count) + 0.5) * (length / count))
+        cells = zip(space.box.lower, space.steps, space.counts, strict=True)
+        axes = [lower + (np.arange(count) + 0.5) * step for lower, step, count in cells]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return jnp.asarray(grid.reshape(-1, space.box.dim))

@@ -85,6 +85,11 @@ class Effect(eqx.Module):
         """The effect's name in reports and compiled programs."""
         return type(self).__name__
 
+    @property
+    def frees_surface(self) -> bool:
+        """Whether the fluid may leave a part of its vessel or its box empty."""
+        return False
+
     def step_limit(self, fluid: Fluid, space: Space) -> Float[Array, ""] | float:
         """The longest stable step [s] as far as this effect goes."""
         return math.inf

@@ -37,6 +37,10 @@ class FreeSurface(Effect):
         ValueError: if `TensileControl` stands before it.
     """
 
+    @property
+    def frees_surface(self):
+        return True
+
     def geometry_terms(self, space):
         return (PairTerm("support_matrix", (), support_matrix), KERNEL_GRADIENT)
 

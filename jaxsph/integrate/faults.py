@@ -23,24 +23,42 @@ class FaultCode(IntEnum):
     STEPS_EXHAUSTED = 8
 
 
+# what it means, and what to do where nothing more is known
 _EXPLANATIONS = {
-    FaultCode.NOT_FINITE: "a value is not finite any more (NaN or infinity); use a smaller time "
-    "step or a higher viscosity",
-    FaultCode.DENSITY_OUT_OF_BOUNDS: "a density left its bounds, so the flow is no longer weakly "
-    "compressible; use a smaller time step or a higher sound speed",
-    FaultCode.NEIGHBOR_OVERFLOW: "a particle has more neighbours than the list holds: particles "
-    "have clumped; resume from the last snapshot (which allocates anew) with a larger margin",
-    FaultCode.NEIGHBORS_OUTDATED: "a particle moved more than half the neighbour list's skin in "
-    "one step; use a smaller time step",
-    FaultCode.SPLINE_CELL_OVERFLOW: "a cell of the reference splines holds more particles than "
-    "allocated: particles have clumped; allocate with a larger margin",
-    FaultCode.BEYOND_WALL: "a particle went through a wall; use a smaller time step or a higher "
-    "resolution",
-    FaultCode.ENERGY_OUT_OF_BOUNDS: "the flow has more energy than its reference speed allows, so "
-    "the reduced model has left the flows that it knows; use other modes, a closure, or a "
-    "parameter nearer to those trained on",
-    FaultCode.STEPS_EXHAUSTED: "the automatic steps became so short that an interval did not end; "
-    "allow more of them, or look at what moves so fast in the last snapshot",
+    FaultCode.NOT_FINITE: (
+        "a value is not finite any more (NaN or infinity)",
+        "use a smaller time step or a higher viscosity",
+    ),
+    FaultCode.DENSITY_OUT_OF_BOUNDS: (
+        "a density left its bounds, so the flow is no longer weakly compressible",
+        "use a smaller time step or a higher sound speed",
+    ),
+    FaultCode.NEIGHBOR_OVERFLOW: (
+        "a particle has more neighbours than the list holds: particles have clumped",
+        "resume from the last snapshot (which allocates anew) with a larger margin",
+    ),
+    FaultCode.NEIGHBORS_OUTDATED: (
+        "a particle moved more than half the neighbour list's skin in one step",
+        "use a smaller time step",
+    ),
+    FaultCode.SPLINE_CELL_OVERFLOW: (
+        "a cell of the reference splines holds more particles than allocated: particles have "
+        "clumped",
+        "allocate with a larger margin",
+    ),
+    FaultCode.BEYOND_WALL: (
+        "a particle went through a wall",
+        "use a smaller time step or a higher resolution",
+    ),
+    FaultCode.ENERGY_OUT_OF_BOUNDS: (
+        "the flow has more energy than its reference speed allows, so the reduced model has left "
+        "the flows that it knows",
+        "use other modes, a closure, or a parameter nearer to those trained on",
+    ),
+    FaultCode.STEPS_EXHAUSTED: (
+        "the automatic steps became so short that an interval did not end",
+        "allow more of them, or look at what moves so fast in the last snapshot",
+    ),
 }
 
 
@@ -65,24 +83,30 @@ class Fault(eqx.Module):
         return cls(code, jnp.where(code == 0, -1, step).astype(jnp.int32), where)
 
 
-def explanation(code: int) -> str:
-    """What a fault code means and what to do."""
-    return _EXPLANATIONS[FaultCode(code)]
+def explanation(code: int, likely: str | None = None) -> str:
+    """What a fault code means, and what is likely or, where that is not known, what to do."""
+    meaning, remedy = _EXPLANATIONS[FaultCode(code)]
+    return f"{meaning}; {likely or remedy}"
 
 
 class SimulationError(RuntimeError):
     """A run met a fault; names the step, its time and the particle.
 
     `trajectory` holds the good snapshots, where `simulate` raised it.
+
+    Args:
+        fault: as the loop returned it.
+        time_step: dt [s].
+        likely: what it most likely comes from and what to do, if that is known.
     """
 
     trajectory = None
 
-    def __init__(self, fault: Fault, time_step: float):
+    def __init__(self, fault: Fault, time_step: float, likely: str | None = None):
         self.code = FaultCode(int(fault.code))
         self.step, self.particle = int(fault.step), int(fault.particle)
         where = f", particle {self.particle}" if self.particle >= 0 else ""
         super().__init__(
             f"step {self.step} (t = {self.step * time_step:.6g} s{where}): "
-            f"{explanation(self.code)}."
+            f"{explanation(self.code, likely)}."
         )

@@ -44,6 +44,11 @@ class Model(eqx.Module):
     def inspect(self, step: Array, state: Any, auxiliary: Any) -> Fault:
         """What is wrong with a step's result, if anything."""
 
+    def likely_cause(self, fault: Fault, state: Any, time_step: float) -> str | None:
+        """What a fault most likely comes from and what to do, told by the last good state on the
+        host; None if nothing stands out."""
+        return None
+
     def enlarged(self) -> Model | None:
         """The same model with more room for neighbours, or None if there is nothing to enlarge."""
         return None

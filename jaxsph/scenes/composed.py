@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
@@ -16,11 +14,14 @@ from ..effects import Effect
 from ..fluid import Fluid
 from ..kernels import Kernel, WendlandC2
 from ..pairs import Space
-from ..particles import ParticleState
+from ..particles import ParticleState, in_dtype
 from ..walls import Region, Walls
 from ..walls.walls import fill
+from .fitting import fitted_resolution
 from .scales import Scale
-from .scene import Scene, as_dtype
+from .scene import Scene
+
+_CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `WallRepulsion`
 
 
 def composed(
@@ -56,7 +57,8 @@ def composed(
         reference_speed: U [m/s].
         mach: U / c0.
         sound_speed: c0 [m/s], where it is not U / mach.
-        side: the length [m] that the resolution divides; the box's longest if none is given.
+        side: the length [m] that the resolution divides, after it is fitted to the region's flat
+            faces; the box's longest if none is given.
         region: where fluid is at the start; if none is given all that walls leave, or the box.
         walls: makes the walls, if there are any.
         velocity: positions (N, n) [m] -> velocities at the start (N, n) [m/s]; rest if none is
@@ -74,7 +76,11 @@ def composed(
     kernel = WendlandC2() if kernel is None else kernel
     arrangement = Packed() if arrangement is None else arrangement
     dtype = jnp.zeros(()).dtype if dtype is None else jnp.dtype(dtype)
-    dx = (max(box.lengths) if side is None else side) / scale.resolution
+    side = max(box.lengths) if side is None else side
+    resolution = scale.resolution
+    if region is not None:
+        resolution = fitted_resolution(box, region, side, resolution)
+    dx = side / resolution
     space = Space(box, kernel, scale.h_over_dx * dx, dx)
     space.check()
     fluid = Fluid(
@@ -88,6 +94,10 @@ def composed(
     position = arrangement.positions(space)
     if region is not None:
         position = fill(region, arrangement.places(space), position)
+    if around is not None:
+        # a particle that was moved into a wall is refused by the scene, not cured
+        clear = around.put_inside(position, _CLEAR * space.spacing)
+        position = jnp.where(around.beyond(position)[:, None], position, clear)
     moving = jnp.zeros_like(position) if velocity is None else velocity(position)
     start = jnp.zeros(len(position)) if pressure is None else pressure(position)
     density = fluid.density(jnp.asarray(start, dtype))
@@ -96,7 +106,7 @@ def composed(
         effects=effects(dtype),
         fluid=fluid,
         space=space,
-        state=as_dtype(ParticleState(position, moving, density), dtype),
+        state=in_dtype(ParticleState(position, moving, density), dtype),
         time_step=scale.time_step,
         end_time=end_time,
         steps_per_snapshot=scale.steps_per_snapshot,
@@ -111,7 +121,7 @@ def composed(
             "kernel": type(kernel).__name__,
             "dtype": str(dtype),
         },
-        walls=jax.tree.map(lambda a: a.astype(dtype) if eqx.is_inexact_array(a) else a, around),
+        walls=around,
     )
 
 

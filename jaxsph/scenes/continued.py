@@ -9,8 +9,8 @@ import jax.numpy as jnp
 
 from ..interpolation import MovingLeastSquaresMap
 from ..pairs import Space
-from ..particles import ParticleState
-from .scene import Scene, as_dtype
+from ..particles import ParticleState, in_dtype
+from .scene import Scene
 
 
 def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
@@ -41,6 +41,6 @@ def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
     found = ParticleState(scene.state.position, values[:, 1:], values[:, 0])
     return dataclasses.replace(
         scene,
-        state=as_dtype(found, scene.state.density.dtype),
+        state=in_dtype(found, scene.state.density.dtype),
         parameters={**scene.parameters, "continued_from_spacing": space.spacing},
     )

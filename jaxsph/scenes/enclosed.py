@@ -82,6 +82,7 @@ def enclosed_flow(
         reference_speed=reference_speed,
         mach=mach,
         side=side,
+        region=fluid_region,
         walls=lambda space: Walls.around(fluid_region, space, moving, layers),
         pressure=pressure,
         arrangement=Lattice() if arrangement is None else arrangement,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from ..effects import Effect
@@ -14,8 +13,10 @@ from ..full_model import CFL, FullModel
 from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
-from ..particles import ParticleState
+from ..particles import ParticleState, in_dtype
 from ..walls import Walls
+from ..walls.filling import refuse_rows_at_walls, volume
+from .checks import check_filled, check_one_fluid, check_resolved
 
 _SKIN = 0.82  # times dx: rebuilt about every second step of the paper's settings (measured)
 _WALL_MARGIN = 1.3  # times the list's need at the start: particles begin on a lattice there
@@ -24,6 +25,8 @@ _SKIN_PER_STEP = 3.5  # times the way of the fastest particle in a step, at leas
 
 class Scene(eqx.Module):
     """A domain, particles, a fluid and a tuple of effects, with the steps to run it by.
+
+    All its real numbers are taken into the precision of its particles' positions.
 
     Args:
         name: as users type it.
@@ -39,7 +42,9 @@ class Scene(eqx.Module):
 
     Raises:
         ValueError: if the time step is beyond the stability limit or does not divide the end time,
-            or a particle starts inside a wall.
+            a particle starts inside a wall or a row of them at one, the fluid leaves a part of its
+            room empty without a free surface, densities are not those of one fluid, or positions
+            are so far from the origin that their precision is too coarse for the spacing.
     """
 
     name: str = eqx.field(static=True)
@@ -53,6 +58,12 @@ class Scene(eqx.Module):
     parameters: dict[str, Any] = eqx.field(static=True, default_factory=dict)
     walls: Walls | None = None
 
+    def __post_init__(self):
+        dtype = self.state.position.dtype
+        for name in ("effects", "fluid", "state", "walls"):
+            setattr(self, name, in_dtype(getattr(self, name), dtype))
+        self.time_step, self.end_time = float(self.time_step), float(self.end_time)
+
     def __check_init__(self):
         if self.steps_per_snapshot < 1:
             raise ValueError(f"steps_per_snapshot: at least 1, got {self.steps_per_snapshot}.")
@@ -60,8 +71,8 @@ class Scene(eqx.Module):
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
-                "(the least of 1.5 h/c0, 0.125 h^2/nu and the limits of other effects); choose one "
-                "below it."
+                "(the least of 1.5 h/c0, 0.125 h^2/nu, 2.1 dx/c0 at walls and the limits of other "
+                "effects); choose one below it."
             )
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
@@ -72,6 +83,10 @@ class Scene(eqx.Module):
                     f"{int(beyond.sum()) - 1} more start inside a wall; leave them out or move "
                     "the wall."
                 )
+            refuse_rows_at_walls(self.walls, self.state.position, self.space)
+        check_one_fluid(self.state.density, float(self.fluid.reference_density))
+        check_resolved(self.state.position, self.space)
+        check_filled(self.state, self.space, self._room)
         reached = self.steps * self.time_step
         if abs(reached - self.end_time) > 1e-6 * self.end_time:
             interval = self.steps_per_snapshot
@@ -96,8 +111,24 @@ class Scene(eqx.Module):
 
     @property
     def mass(self):
-        """Mass of a particle [kg]: rho0 dx^n."""
-        return self.fluid.reference_density * self.space.spacing**self.space.box.dim
+        """Mass of a particle [kg]: rho0 V / N where the fluid fills a volume V, its vessel or its
+        periodic box, and rho0 times a cell of the lattice where it has a free surface."""
+        return self.fluid.reference_density * self.particle_volume
+
+    @property
+    def particle_volume(self) -> float:
+        """Volume of a particle at rest [m^n]."""
+        room = self._room
+        return self.space.cell_volume if room is None else room / len(self.state.position)
+
+    @property
+    def _room(self) -> float | None:
+        """Volume [m^n] that the fluid fills; None where it may have a free surface."""
+        if any(effect.frees_surface for effect in self.effects):
+            return None
+        if self.walls is not None:
+            return volume(self.walls.start_region, self.space)
+        return self.space.box.volume if all(self.space.box.periodic) else None
 
     def functional(self) -> SPHFunctional:
         """The scene's effects composed into f(w, t; mu)."""
@@ -135,10 +166,3 @@ class Scene(eqx.Module):
     def model(self, state: ParticleState | None = None, margin: float | None = None) -> FullModel:
         """The full model, its neighbour list allocated for a state."""
         return FullModel(self.functional(), self.search(state, margin))
-
-
-def as_dtype(state: ParticleState, dtype) -> ParticleState:
-    """A state in the wanted precision."""
-    return ParticleState(
-        *(jnp.asarray(a, dtype) for a in (state.position, state.velocity, state.density))
-    )

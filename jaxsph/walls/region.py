@@ -25,6 +25,11 @@ class Region(abc.ABC):
         """Distance [m] to the region's surface, negative inside. Inside unions and outside
         intersections it may be less than the true distance in size; its sign is always right."""
 
+    @property
+    def flat_faces(self) -> tuple[tuple[int, float], ...]:
+        """Axis and place [m] of its faces across the axes."""
+        return ()
+
     def __or__(self, other: Region) -> Region:
         return Union((self, other))
 
@@ -50,6 +55,11 @@ class BoxRegion(Region):
             a < b for a, b in zip(self.lower, self.upper, strict=True)
         ):
             raise ValueError(f"BoxRegion: every upper must exceed its lower, got {self}.")
+
+    @property
+    def flat_faces(self):
+        faces = [face for corner in (self.lower, self.upper) for face in enumerate(corner)]
+        return tuple(face for face in faces if np.isfinite(face[1]))
 
     def signed_distance(self, position):
         beyond = []
@@ -78,6 +88,7 @@ class BallRegion(Region):
 
     def __post_init__(self):
         object.__setattr__(self, "center", tuple(map(float, self.center)))
+        object.__setattr__(self, "radius", float(self.radius))
         if not self.radius > 0.0:
             raise ValueError(f"BallRegion: radius must be positive, got {self.radius:g} m.")
 
@@ -109,6 +120,10 @@ class Union(Region):
 
     parts: tuple[Region, ...]
 
+    @property
+    def flat_faces(self):
+        return tuple(face for part in self.parts for face in part.flat_faces)
+
     def signed_distance(self, position):
         return reduce(jnp.minimum, [part.signed_distance(position) for part in self.parts])
 
@@ -119,6 +134,10 @@ class Complement(Region):
     """What is not in a region."""
 
     region: Region
+
+    @property
+    def flat_faces(self):
+        return self.region.flat_faces
 
     def signed_distance(self, position):
         return -self.region.signed_distance(position)

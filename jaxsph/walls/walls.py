@@ -16,7 +16,6 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..arrangements import Lattice
-from ..domain import Box
 from ..pairs import Space
 from .moving_body import Bodies, MovingBody
 from .region import Region
@@ -256,12 +255,17 @@ def fill(
             f"arrangement: gives {position.shape[0]} particles for a box with {lattice.shape[0]} "
             "places; give one for each."
         )
-    inside = _in_blocks(_distance, region, np.asarray(lattice)) < 0.0
+    inside = distances(region, np.asarray(lattice)) < 0.0
     if not inside.any():
         raise ValueError(
             "fluid: no particle lies in the region; raise the resolution or check the region."
         )
     return position[inside]
+
+
+def distances(region: Region, points: np.ndarray) -> np.ndarray:
+    """The region's signed distance [m] at many points (P, n) [m], on the host."""
+    return _in_blocks(_distance, region, points)
 
 
 def _in_blocks(function, region: Region, points: np.ndarray) -> np.ndarray:
@@ -290,16 +294,13 @@ def _at(point) -> str:
 
 def _extended_lattice(space: Space, layers: int) -> np.ndarray:
     """The lattice of the box, continued by some layers beyond its closed faces."""
-    dx, box = space.spacing, space.box
-    counts = [round(length / dx) for length in box.lengths]
-    steps = [length / count for length, count in zip(box.lengths, counts, strict=True)]
-    more = [0 if periodic else layers for periodic in box.periodic]
-    wider = Box(
-        tuple(a - m * s for a, m, s in zip(box.lower, more, steps, strict=True)),
-        tuple(b + m * s for b, m, s in zip(box.upper, more, steps, strict=True)),
-        box.periodic,
-    )
-    return np.asarray(Lattice().positions(Space(wider, space.kernel, space.smoothing_length, dx)))
+    box = space.box
+    axes = []
+    cells = zip(box.lower, space.steps, space.counts, box.periodic, strict=True)
+    for lower, step, count, periodic in cells:
+        more = 0 if periodic else layers
+        axes.append(lower + (np.arange(-more, count + more) + 0.5) * step)
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, box.dim)
 
 
 def _refuse_gaps(distance, space: Space) -> None:

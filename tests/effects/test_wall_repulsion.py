@@ -4,10 +4,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import Box, BoxRegion, Fluid, Space
+from jaxsph import Box, BoxRegion, Fluid, ParticleState, Space, Walls, run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import Context, WallRepulsion
 from jaxsph.kernels import WendlandC2
+from jaxsph.scenes import Scene
+from jaxsph.schemes import Consistent, DeltaPlus
 
 RHO0, C0 = 1000.0, 10.0
 DX = 0.1
@@ -46,3 +48,30 @@ def test_repulsion_holds_what_flies_at_a_wall_with_up_to_a_seventh_of_the_speed_
     work = np.trapezoid(force, depth)
     # v^2 / 2 = A a c0^2 / (3 dx); quadrature of a parabola with 1500 intervals: 1e-6
     assert np.sqrt(2.0 * work) == pytest.approx(np.sqrt(0.02) * C0, rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", [DeltaPlus(), Consistent()], ids=["delta-plus", "consistent"])
+def test_a_row_near_a_wall_is_stable_at_the_longest_step(scheme):
+    """One row is 0.06 spacings from the wall; at 0.05 it would be refused."""
+    box = Box((0.0, 0.0), (1.0, 0.6), (True, False))
+    space = Space(box, WendlandC2(), 2.0 * DX, DX)
+    channel = BoxRegion((-np.inf, 0.0), (np.inf, 0.45 + 0.06 * DX))
+    position = Lattice().positions(space)
+    position = position[np.asarray(channel.signed_distance(position)) < 0.0]
+    state = ParticleState(position, 0.0 * position, jnp.full(len(position), RHO0))
+    effects = scheme.effects(jnp.zeros(()).dtype, 5e-3, vessel=channel)
+    fluid = Fluid(RHO0, C0, 1.0)
+    longest = float(WallRepulsion(channel).step_limit(fluid, space))
+    assert longest == pytest.approx(2.12 * DX / C0, rel=1e-2)
+
+    def scene(step):
+        walls = Walls.around(channel, space)
+        return Scene(
+            "near", effects, fluid, space, state, step, 60 * step, 60, walls=walls
+        )
+
+    with pytest.raises(ValueError, match="time step: .* 2.1 dx/c0 at walls"):
+        scene(1.05 * longest)
+    speed = np.linalg.norm(run_scene(scene(longest)).velocity, axis=2).max(axis=1)
+    # thrown off with at most c0 (2 A a (1 - d / a)^3 / (3 dx))^(1/2) = 0.66 m/s, then slowed
+    assert speed[-1] < 0.5
