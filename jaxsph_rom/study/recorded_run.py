@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,9 @@ from typing import Any
 import jax
 
 from jaxsph import Trajectory, simulate
+from jaxsph.content import content, digest
 from jaxsph.integrate import Model
-from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
+from jaxsph.io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.scenes import Scene
 
 # label, steps in all, steps done -> context manager that gives a function to report steps to
@@ -28,10 +28,9 @@ def recorded_run(
     restore: Callable[[Trajectory], Any],
     label: str,
     progress: Progress,
+    made_by: Mapping[str, Any] | None = None,
 ) -> Trajectory:
     """The trajectory in the file at `path`, run as far as it is not there yet.
-
-    A file whose recorded parameters differ from the scene's is replaced.
 
     Args:
         path: of the trajectory file.
@@ -41,59 +40,90 @@ def recorded_run(
         restore: makes the state from the last snapshot of a trajectory.
         label: for the progress bar.
         progress: opens a progress bar.
+        made_by: what else makes the run, beside the scene.
 
     Raises:
+        TrajectoryFileError: if the file holds another run, or another process writes it; it stays
+            as it is.
         SimulationError: on a fault; the file then holds the good snapshots.
     """
-    done = _steps_done(path, scene)
+    wanted = {**(content({"made_by": made_by}) if made_by else {}), **content(scene)}
+    done = steps_done(path, wanted)
     if done == scene.steps:
-        return read_trajectory(path)
+        return _whole(path, scene)
     made = model()
     if done:
-        state, writer = restore(read_trajectory(path)), TrajectoryWriter.append_to(path)
+        begun, writer = read_trajectory(path), TrajectoryWriter.append_to(path)
+        state = restore(begun)
+        if writer.last_step != begun.metadata["steps"]:
+            writer.close()
+            raise _disturbed(path)
     else:
         state = start(made)
         coordinates = jax.eval_shape(made.observe, state).coordinates
         modes = None if coordinates is None else coordinates.shape[0]
-        writer = TrajectoryWriter.create(path, scene, modes=modes, overwrite=True)
-    with progress(label, scene.steps, done) as report, writer:
+        writer = TrajectoryWriter.create(
+            path, scene, modes=modes, made_by=wanted, overwrite=done is not None
+        )
+    with progress(label, scene.steps, done or 0) as report, writer:
         part = simulate(
             made,
             state,
             time_step=scene.time_step,
             steps=scene.steps,
             steps_per_snapshot=scene.steps_per_snapshot,
-            first_step=done,
+            first_step=done or 0,
             recorder=writer,
             progress=report,
             metadata={"scene": scene.name, "parameters": scene.parameters},
         )
         writer.finish(part.metadata)
-    return read_trajectory(path)
+    return _whole(path, scene)
 
 
-def _steps_done(path: Path, scene: Scene) -> int:
-    """Steps recorded of exactly this run; 0 if there are none."""
+def steps_done(path: Path, wanted: Mapping[str, str]) -> int | None:
+    """Steps that a file holds of the run of that content; None if there is no file.
+
+    Raises:
+        TrajectoryFileError: naming what differs, if the file holds another run.
+    """
     if not path.exists():
-        return 0
+        return None
     found = read_checkpoint(path)
-    wanted = json.loads(json.dumps(scene.parameters))
-    if found.scene != scene.name or found.parameters != wanted or found.steps != scene.steps:
-        return 0
+    found.check(path, wanted)
     return max(found.step, 0)
 
 
-def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
-    """The full model's trajectory, kept in `folder`."""
-    reynolds = scene.parameters["reynolds"]
+def _whole(path: Path, scene: Scene) -> Trajectory:
+    """The trajectory in a file, which must be all of the scene's run."""
+    trajectory = read_trajectory(path)
+    if len(trajectory.time) != scene.steps // scene.steps_per_snapshot + 1:
+        raise _disturbed(path)
+    return trajectory
 
+
+def _disturbed(path: Path) -> TrajectoryFileError:
+    return TrajectoryFileError(
+        f"{path}: was written by another process in between; repeat the call once that has ended."
+    )
+
+
+def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
+    """The full model's trajectory, kept in `folder`.
+
+    Raises:
+        TrajectoryFileError: if another scene's run is kept there in its place.
+        SimulationError: on a fault; the file then holds the good snapshots.
+    """
+    reynolds = scene.parameters.get("reynolds")
+    short = f"{scene.name}-{digest(scene)[1:9]}" if reynolds is None else f"re-{reynolds:g}"
     return recorded_run(
-        folder / f"re-{reynolds:g}" / "trajectory.h5",
+        folder / short / "trajectory.h5",
         scene,
         scene.model,
         lambda _: scene.state,
         lambda trajectory: trajectory.state(-1),
-        f"full model, Re {reynolds:g}",
+        f"full model, {scene.name if reynolds is None else f'Re {reynolds:g}'}",
         progress,
     )
 

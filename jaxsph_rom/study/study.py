@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
+from jaxsph.content import digest
 from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.io import read_trajectory
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
@@ -247,6 +248,15 @@ class Study:
                 restore,
                 f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
                 self.progress,
+                {
+                    "training": [digest(self.scene(number)) for number in experiment.trained_on],
+                    "product": self.product,
+                    "centring": self.centring,
+                    "advection": self.advection,
+                    "projection": projection,
+                    "map": self.rule,
+                    "interpolation": self.interpolation,
+                },
             )
         except SimulationError as error:
             fault, run = error, read_trajectory(path)
