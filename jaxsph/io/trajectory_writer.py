@@ -124,11 +124,15 @@ class TrajectoryWriter:
         return cls(path, fill)
 
     @classmethod
-    def append_to(cls, path: str | os.PathLike) -> TrajectoryWriter:
+    def append_to(cls, path: str | os.PathLike, scene: Any = None) -> TrajectoryWriter:
         """Go on with a file whose run was cut short, from its last whole snapshot.
 
         The snapshots go into a copy, which then takes the file's place: there is a whole file at
         any time.
+
+        Args:
+            path: of the file.
+            scene: that the run goes on as, its end another one say; as it was if none is given.
 
         Raises:
             TrajectoryFileError: if the file cannot be read or written.
@@ -138,7 +142,7 @@ class TrajectoryWriter:
 
         def fill(file):
             with opened(path) as (source, count):
-                _copy_attributes(source, file)
+                _copy_attributes(source, file, scene)
                 for name in source:
                     source.copy(name, file)
                     file[name].resize(count, 0)
@@ -147,7 +151,7 @@ class TrajectoryWriter:
 
     @classmethod
     def branch(
-        cls, source: str | os.PathLike, path: str | os.PathLike, step: int
+        cls, source: str | os.PathLike, path: str | os.PathLike, step: int, scene: Any = None
     ) -> TrajectoryWriter:
         """A new file that goes on from a snapshot of another one, which stays as it is.
 
@@ -157,6 +161,7 @@ class TrajectoryWriter:
             source: of the other file.
             path: of the new one; folders are made as needed.
             step: of the snapshot to go on from.
+            scene: as for `append_to`.
 
         Raises:
             TrajectoryFileError: if the source has no snapshot of that step or cannot be read, or
@@ -168,7 +173,7 @@ class TrajectoryWriter:
             count = count_up_to(source, old["step"][:stored], step)
 
             def fill(file):
-                _copy_attributes(old, file)
+                _copy_attributes(old, file, scene)
                 metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
                 for name in old:
@@ -248,11 +253,18 @@ class TrajectoryWriter:
         self.close()
 
 
-def _copy_attributes(source: h5py.File, file: h5py.File) -> None:
-    """What a file says of its run, which is not complete."""
+def _copy_attributes(source: h5py.File, file: h5py.File, scene: Any) -> None:
+    """What a file says of its run, which is not complete; of the scene, if another is given."""
     for name, value in source.attrs.items():
         file.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
     file.attrs["complete"] = False
+    if scene is not None:
+        file.attrs["steps"] = int(scene.steps)
+        file.attrs["parameters"] = _to_json(scene.parameters)
+        if "content" in source.attrs:  # its particles are no longer those of the start
+            kept = json.loads(source.attrs["content"])
+            start = {name: text for name, text in kept.items() if name.startswith("state.")}
+            file.attrs["content"] = json.dumps({**content(scene), **start})
 
 
 def _to_json(value: Any) -> str:

@@ -1,111 +1,20 @@
-"""Runs kept on disk: done once, and taken up again where they were cut short."""
+"""Full runs of scenes, kept in a folder."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-import jax
-
-from jaxsph import Trajectory, simulate
-from jaxsph.content import content, digest
-from jaxsph.integrate import Model
-from jaxsph.io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
+from jaxsph import Trajectory
+from jaxsph.content import digest
+from jaxsph.kept_run import kept_run
 from jaxsph.scenes import Scene
 
 # label, steps in all, steps done -> context manager that gives a function to report steps to
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[int], None]]]
-
-
-def recorded_run(
-    path: Path,
-    scene: Scene,
-    model: Callable[[], Model],
-    start: Callable[[Model], Any],
-    restore: Callable[[Trajectory], Any],
-    label: str,
-    progress: Progress,
-    made_by: Mapping[str, Any] | None = None,
-) -> Trajectory:
-    """The trajectory in the file at `path`, run as far as it is not there yet.
-
-    Args:
-        path: of the trajectory file.
-        scene: its steps, and its parameters as they are recorded.
-        model: makes the model, if there is anything left to run.
-        start: makes the initial state from the model.
-        restore: makes the state from the last snapshot of a trajectory.
-        label: for the progress bar.
-        progress: opens a progress bar.
-        made_by: what else makes the run, beside the scene.
-
-    Raises:
-        TrajectoryFileError: if the file holds another run, or another process writes it; it stays
-            as it is.
-        SimulationError: on a fault; the file then holds the good snapshots.
-    """
-    wanted = {**(content({"made_by": made_by}) if made_by else {}), **content(scene)}
-    done = steps_done(path, wanted)
-    if done == scene.steps:
-        return _whole(path, scene)
-    made = model()
-    if done:
-        begun, writer = read_trajectory(path), TrajectoryWriter.append_to(path)
-        state = restore(begun)
-        if writer.last_step != begun.metadata["steps"]:
-            writer.close()
-            raise _disturbed(path)
-    else:
-        state = start(made)
-        coordinates = jax.eval_shape(made.observe, state).coordinates
-        modes = None if coordinates is None else coordinates.shape[0]
-        writer = TrajectoryWriter.create(
-            path, scene, modes=modes, made_by=wanted, overwrite=done is not None
-        )
-    with progress(label, scene.steps, done or 0) as report, writer:
-        part = simulate(
-            made,
-            state,
-            time_step=scene.time_step,
-            steps=scene.steps,
-            steps_per_snapshot=scene.steps_per_snapshot,
-            first_step=done or 0,
-            recorder=writer,
-            progress=report,
-            metadata={"scene": scene.name, "parameters": scene.parameters},
-        )
-        writer.finish(part.metadata)
-    return _whole(path, scene)
-
-
-def steps_done(path: Path, wanted: Mapping[str, str]) -> int | None:
-    """Steps that a file holds of the run of that content; None if there is no file.
-
-    Raises:
-        TrajectoryFileError: naming what differs, if the file holds another run.
-    """
-    if not path.exists():
-        return None
-    found = read_checkpoint(path)
-    found.check(path, wanted)
-    return max(found.step, 0)
-
-
-def _whole(path: Path, scene: Scene) -> Trajectory:
-    """The trajectory in a file, which must be all of the scene's run."""
-    trajectory = read_trajectory(path)
-    if len(trajectory.time) != scene.steps // scene.steps_per_snapshot + 1:
-        raise _disturbed(path)
-    return trajectory
-
-
-def _disturbed(path: Path) -> TrajectoryFileError:
-    return TrajectoryFileError(
-        f"{path}: was written by another process in between; repeat the call once that has ended."
-    )
 
 
 def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
@@ -117,14 +26,14 @@ def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
     """
     reynolds = scene.parameters.get("reynolds")
     short = f"{scene.name}-{digest(scene)[1:9]}" if reynolds is None else f"re-{reynolds:g}"
-    return recorded_run(
+    label = f"full model, {scene.name if reynolds is None else f'Re {reynolds:g}'}"
+    return kept_run(
         folder / short / "trajectory.h5",
         scene,
         scene.model,
         lambda _: scene.state,
         lambda trajectory: trajectory.state(-1),
-        f"full model, {scene.name if reynolds is None else f'Re {reynolds:g}'}",
-        progress,
+        lambda done: progress(label, scene.steps, done),
     )
 
 

@@ -17,6 +17,7 @@ from jaxsph import SimulationError, Trajectory
 from jaxsph.content import digest
 from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.io import read_trajectory
+from jaxsph.kept_run import kept_run
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
 
@@ -28,7 +29,7 @@ from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projecti
 from ..reference import ReferenceSpace, lagrangian_snapshots
 from ..report import Case
 from ..splines import LocalSplines
-from .recorded_run import Progress, full_run, recorded_run, with_record
+from .recorded_run import Progress, full_run, with_record
 
 
 @dataclass(frozen=True)
@@ -236,9 +237,10 @@ class Study:
 
         path = self.folder / "reduced" / f"{self._options}-{trained}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
+        label = f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}"
         fault = None
         try:
-            run = recorded_run(
+            run = kept_run(
                 path,
                 recorded,
                 lambda: ReducedModel.of_scene(
@@ -246,8 +248,7 @@ class Study:
                 ),
                 lambda model: eqx.filter_jit(model.project)(scene.state),
                 restore,
-                f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
-                self.progress,
+                lambda done: self.progress(label, scene.steps, done),
                 {
                     "training": [digest(self.scene(number)) for number in experiment.trained_on],
                     "product": self.product,

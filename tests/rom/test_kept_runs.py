@@ -15,7 +15,7 @@ from jaxsph.effects import Gravity
 from jaxsph.io import TrajectoryFileError, TrajectoryWriter
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import Energy, Experiment, Study
-from jaxsph_rom.study import full_run, recorded_run
+from jaxsph_rom.study import full_run
 from jaxsph_rom.study.study import silent
 
 EXPERIMENT = Experiment((100.0,), (100.0,), (2,))
@@ -99,7 +99,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path):
 
 def test_a_run_that_another_process_has_cut_is_not_handed_on(tmp_path):
     """The last step is checked after reading."""
-    path = tmp_path / "trajectory.h5"
+    path = tmp_path / "re-100" / "trajectory.h5"
 
     @contextmanager
     def replaced_meanwhile(label, total, done):
@@ -110,7 +110,4 @@ def test_a_run_that_another_process_has_cut_is_not_handed_on(tmp_path):
         (tmp_path / "other.h5").rename(path)
 
     with pytest.raises(TrajectoryFileError, match="holds no snapshot|by another process"):
-        recorded_run(
-            path, make(), make().model, lambda _: make().state, lambda t: t.state(-1), "",
-            replaced_meanwhile,
-        )  # fmt: skip
+        full_run(tmp_path, make(), replaced_meanwhile)
