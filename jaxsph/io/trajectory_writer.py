@@ -18,6 +18,7 @@ import numpy as np
 
 from ..content import content
 from ..environment import versions
+from ..record import plain
 from ..trajectory import Snapshot
 from .growing_file import COMPRESSION, abandon, add_dataset, begin, check_target, unwritable
 from .lock import Lock
@@ -268,4 +269,4 @@ def _copy_attributes(source: h5py.File, file: h5py.File, scene: Any) -> None:
 
 
 def _to_json(value: Any) -> str:
-    return json.dumps(value, default=lambda array: np.asarray(array).tolist())
+    return json.dumps(plain(value, "parameters"))

@@ -17,6 +17,7 @@ from ..fluid import Fluid
 from ..kernels import Kernel, WendlandC2
 from ..pairs import Space
 from ..particles import ParticleState
+from ..record import record
 from ..walls import Region, Walls
 from ..walls.walls import fill
 from .scales import Scale
@@ -108,7 +109,7 @@ def composed(
             "end_time": end_time,
             "mach": mach,
             "arrangement": arrangement.record(),
-            "kernel": type(kernel).__name__,
+            "kernel": record(kernel),
             "dtype": str(dtype),
         },
         walls=jax.tree.map(lambda a: a.astype(dtype) if eqx.is_inexact_array(a) else a, around),

@@ -19,6 +19,7 @@ from jaxtyping import Int
 from ..content import content, differences
 from ..environment import versions
 from ..io import TrajectoryFileError, unwritable, whole_file
+from ..record import plain
 from ..scenes import Scene
 from ..trajectory import Snapshot, Trajectory
 
@@ -152,9 +153,8 @@ def read_member(path: str | os.PathLike, number: int) -> Trajectory:
 
 def _identity(scenes: Sequence[Scene]) -> str:
     """What tells a sweep from others."""
-    return json.dumps(
-        {"scene": scenes[0].name, "parameters": [dict(scene.parameters) for scene in scenes]}
-    )
+    parameters = plain([scene.parameters for scene in scenes], "parameters")
+    return json.dumps({"scene": scenes[0].name, "parameters": parameters})
 
 
 def _contents(scenes: Sequence[Scene]) -> list[dict[str, str]]:
