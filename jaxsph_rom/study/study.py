@@ -45,6 +45,23 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class ModelBasis:
+    """What a reduced model is made of, for the report.
+
+    Args:
+        model: what kind it is.
+        trained_on: Reynolds numbers of its training runs.
+        basis: of the model.
+        reference: the points of its modes, and the map to them.
+    """
+
+    model: str
+    trained_on: tuple[float, ...]
+    basis: Basis
+    reference: ReferenceSpace
+
+
+@dataclass(frozen=True)
 class Outcome:
     """A reduced run beside its full one.
 
@@ -53,6 +70,7 @@ class Outcome:
         time, velocity_percent, pressure_percent: discrepancy on the probes over time (S,).
         trajectory: of the reduced model, as far as it came.
         profile: velocity norm and pressure on the probes over time, each (S, P).
+        made_of: the model's basis; None if it is that of the study.
     """
 
     case: Case
@@ -61,6 +79,7 @@ class Outcome:
     pressure_percent: np.ndarray
     trajectory: Trajectory
     profile: tuple[np.ndarray, np.ndarray]
+    made_of: ModelBasis | None = None
 
 
 class Study:
@@ -292,6 +311,7 @@ class Study:
         profile: tuple[np.ndarray, np.ndarray],
         fault: SimulationError | None,
         rest: dict[str, Any],
+        made_of: ModelBasis | None = None,
     ) -> Outcome:
         """A reduced run beside its full one.
 
@@ -301,6 +321,7 @@ class Study:
             profile: its velocity norm and pressure on the probes (S, P).
             fault: that ended it, if any.
             rest: values of the `Case` that only its maker knows.
+            made_of: the model's basis; that of the study if none is given.
         """
         scene, full = self.scene(reynolds), self.full(reynolds)
         truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
@@ -324,7 +345,7 @@ class Study:
             fault_time=None if fault is None else fault.step * scene.time_step,
             **rest,
         )
-        return Outcome(case, run.time, percent[0], percent[1], run, profile)
+        return Outcome(case, run.time, percent[0], percent[1], run, profile, made_of)
 
 
 def _centre_line(scene: Scene) -> np.ndarray:
