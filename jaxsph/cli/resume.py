@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
@@ -17,8 +18,11 @@ from ..scenes.record import scene_from_record
 from .errors import Parser
 from .options import positive_float, whole_number
 from .recorded import REPORT, simulate_and_report
+from .scene_functions import is_file, made
+from .scene_options import scene_settings
 
 _COSTLY = ("Packed", "Stirred")  # to make, and as many particles as the lattice
+_END = ("end_time", "parameters.end_time")  # what of the content tells the end
 _OF_NO_RECORD = ("state.", "made_by")  # the start is in the file; steps are chosen again
 _SAME_TIME = 0.01  # snapshot intervals by which a given time may be off that of a snapshot
 
@@ -68,11 +72,16 @@ def check_resume_options(options, scene_options: list[str]) -> None:
         )
 
 
-def resume(options) -> int:
-    """Go on with the run in a file, in that file or, from an earlier snapshot, in a new one."""
+def resume(options, make: Callable[..., Scene]) -> int:
+    """Go on with the run in a file, in that file or, from an earlier snapshot, in a new one.
+
+    Args:
+        options: of the command.
+        make: the scene's function; one of the user's own is given the settings again.
+    """
     path = options.resume
     checkpoint = read_checkpoint(path)
-    if checkpoint.scene != options.scene:
+    if not is_file(options.scene) and checkpoint.scene != options.scene:
         raise ValueError(
             f"{path}: holds a run of scene {checkpoint.scene}, not of {options.scene}; "
             f"name that scene or another file."
@@ -89,8 +98,12 @@ def resume(options) -> int:
         print(f"{path} is complete ({checkpoint.step} steps to t = {end:g} s): nothing to do.")
         return 0
     check_target(target.with_name(REPORT))
-    with jax.enable_x64(checkpoint.parameters.get("dtype") != "float32"):
-        scene = _restored(path, checkpoint, options.t_end)
+    precision = options.precision or checkpoint.parameters.get("dtype")
+    with jax.enable_x64(precision != "float32"):
+        if is_file(options.scene):
+            scene = _made_again(path, checkpoint, options, make)
+        else:
+            scene = _restored(path, checkpoint, options.t_end)
         # room for neighbours as at the run's own start, so that sums are rounded alike
         start = scene.state if checkpoint.state is None else _arrays(read_checkpoint(path, 0).state)
         longer = None if options.t_end is None else scene
@@ -156,6 +169,21 @@ def _restored(path: Path, checkpoint: Checkpoint, end_time: float | None) -> Sce
     return scene if end_time is None else _longer(scene, end_time, checkpoint)
 
 
+def _made_again(path: Path, checkpoint: Checkpoint, options, make) -> Scene:
+    """The scene of the user's own function, which must be the file's; its particles as stored."""
+    precision = options.precision or checkpoint.parameters.get("dtype", "float64")
+    scene = made(make, scene_settings(options, make, precision))
+    wanted = content(scene)
+    if options.t_end is not None and checkpoint.content is not None:
+        _check_later(options.t_end, scene, checkpoint)
+        end = {name: wanted[name] for name in _END if name in wanted}
+        checkpoint = dataclasses.replace(checkpoint, content=checkpoint.content | end)
+    checkpoint.check(path, wanted)
+    if checkpoint.state is None:
+        return scene
+    return dataclasses.replace(scene, state=_arrays(checkpoint.state))
+
+
 def _check_unedited(path: Path, checkpoint: Checkpoint, scene: Scene) -> None:
     """A ValueError if what was run is not what the record of its parameters makes."""
     if checkpoint.content is None:  # an old file
@@ -174,11 +202,16 @@ def _check_unedited(path: Path, checkpoint: Checkpoint, scene: Scene) -> None:
 
 def _longer(scene: Scene, end_time: float, checkpoint: Checkpoint) -> Scene:
     """The scene up to a later time [s]."""
+    _check_later(end_time, scene, checkpoint)
+    parameters = {**scene.parameters, "end_time": end_time}
+    return dataclasses.replace(scene, end_time=end_time, parameters=parameters)
+
+
+def _check_later(end_time: float, scene: Scene, checkpoint: Checkpoint) -> None:
+    """A ValueError if a run has come as far already."""
     done = max(0, checkpoint.step) * scene.time_step
     if not end_time > done * (1.0 + 1e-9):
         raise ValueError(f"--t-end: the run has come to t = {done:g} s; give a later time.")
-    parameters = {**scene.parameters, "end_time": end_time}
-    return dataclasses.replace(scene, end_time=end_time, parameters=parameters)
 
 
 def _arrays(state: ParticleState) -> ParticleState:

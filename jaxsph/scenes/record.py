@@ -52,7 +52,18 @@ def scene_from_record(
         options.setdefault("scheme", DeltaPlus.__name__)
     if arrangement is not None:
         options["arrangement"] = arrangement
-    for key, (base, package) in _RULES.items():
-        if options.get(key) is not None and not isinstance(options[key], base):
-            options[key] = restored(options[key], base, package)
-    return dataclasses.replace(make(**options), parameters=parameters)
+    return dataclasses.replace(make(**rules_restored(options)), parameters=parameters)
+
+
+def rules_restored(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a scene with the rules among them made from their records.
+
+    Raises:
+        ValueError: if a rule is not known.
+    """
+    made = {
+        key: restored(settings[key], base, package)
+        for key, (base, package) in _RULES.items()
+        if settings.get(key) is not None and not isinstance(settings[key], base)
+    }
+    return settings | made
