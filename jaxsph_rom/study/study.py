@@ -222,6 +222,8 @@ class Study:
             parts.append(self.rule.__name__.removesuffix("Map").lower())
         if self.interpolation is not LocalSplines:
             parts.append(self.interpolation.__name__.lower())
+        if self.spline_order != 3:
+            parts.append(f"order-{self.spline_order}")
         return "-".join(parts)
 
     def _reduced(self, experiment, reynolds, basis, interpolation, projection) -> Outcome:
