@@ -28,7 +28,7 @@ def record(thing: Any) -> str | dict[str, Any]:
         >>> from jaxsph.kernels import WendlandC2
         >>> from jaxsph.record import record
         >>> record(WendlandC2()), record(JitteredLattice(seed=3))
-        ('WendlandC2', {'rule': 'JitteredLattice', 'fraction': 0.2, 'seed': 3})
+        ('WendlandC2', {'rule': 'JitteredLattice', 'amplitude': 0.2, 'seed': 3})
     """
     kind = type(thing)
     package = sys.modules.get(kind.__module__.rpartition(".")[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
+import errno
 import json
 import os
 import socket
@@ -13,9 +13,18 @@ from typing import IO
 from .growing_file import unwritable
 from .trajectory_file import TrajectoryFileError
 
+try:
+    import fcntl
+except ImportError:  # where the system has none
+    fcntl = None
+
+_WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)  # says a file system
+
 
 class Lock:
     """Holds `PATH.lock` until it is released; one that a dead process left is taken over.
+
+    Where the system or the file system knows no locks there is none.
 
     Args:
         path: of the file to be written.
@@ -25,7 +34,9 @@ class Lock:
     """
 
     def __init__(self, path: Path):
-        self._path = path.with_name(path.name + ".lock")
+        self._path, self._file = path.with_name(path.name + ".lock"), None
+        if fcntl is None:
+            return
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = _held(self._path)
@@ -43,7 +54,7 @@ class Lock:
 
     def release(self) -> None:
         """Let others write; nothing happens if it is released."""
-        if not self._file.closed:
+        if self._file is not None and not self._file.closed:
             self._path.unlink(missing_ok=True)  # first, or another's could go
             self._file.close()
 
@@ -59,7 +70,7 @@ def _held(path: Path) -> IO[bytes]:
     while True:
         file = open(path, "ab", buffering=0)  # noqa: SIM115 (closed by `release`)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _flock(file)
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                     return file
@@ -67,6 +78,14 @@ def _held(path: Path) -> IO[bytes]:
             file.close()
             raise
         file.close()  # its holder has just removed it
+
+
+def _flock(file: IO[bytes]) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno not in _WITHOUT_LOCKS:
+            raise
 
 
 def _holder(path: Path) -> str:

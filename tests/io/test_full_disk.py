@@ -1,6 +1,5 @@
 """A disk that takes no more: one error, nothing half-written, and the process goes on."""
 
-import resource
 import signal
 from contextlib import contextmanager
 
@@ -21,6 +20,8 @@ from jaxsph.scenes import taylor_green
 from jaxsph.sweeps import SweepFileError
 from jaxsph.trajectory import Snapshot
 from tests.runs import random_run
+
+resource = pytest.importorskip("resource")  # where processes have limits
 
 FIELDS = ("position", "velocity", "density", "pressure")
 SIZES = (0, 100, 3_000, 7_000, 30_000)  # bytes at which the disk is full
