@@ -1,7 +1,11 @@
 """What tells one scene from another: everything that changes a run, and nothing else."""
 
 import dataclasses
+import os
+import subprocess
+import sys
 from functools import partial
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -9,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxsph
 from jaxsph import BoxRegion, MovingBody, TaitEquationOfState
 from jaxsph.arrangements import Lattice
 from jaxsph.content import content, differences, digest
@@ -112,6 +117,21 @@ def test_the_code_of_own_functions_and_classes_counts():
     named = partial(lambda t, speed: t * speed, speed=SPEED)
     assert content(named)["named.speed"] == "3"
     assert content(jax.jit(one))["function"] == content(one)[""]
+
+
+def test_it_is_the_same_in_another_process():
+    """Where sets have another order."""
+    script = (
+        "from jaxsph.content import digest\n"
+        "def chosen(t, names=frozenset('abcdefgh')): return t in {'u', 'v', 'w', 'x', 'y', 'z'}\n"
+        "print(digest(chosen))"
+    )
+    root = str(Path(jaxsph.__file__).parents[1])
+    found = set()
+    for seed in "123":
+        environment = {**os.environ, "PYTHONPATH": root, "PYTHONHASHSEED": seed}
+        found.add(subprocess.check_output([sys.executable, "-c", script], env=environment))
+    assert len(found) == 1
 
 
 def again(n):
