@@ -25,7 +25,7 @@ from .pairs import PairTerm as PairTerm
 from .pairs import Space as Space
 from .pairs import pair_sum as pair_sum
 from .particles import ParticleState as ParticleState
-from .simulate import run_scene as run_scene
+from .run_scene import run_scene as run_scene
 from .simulate import simulate as simulate
 from .sweeps import read_member as read_member
 from .sweeps import read_status as read_status

@@ -171,34 +171,3 @@ def _lost(snapshot: Snapshot) -> int | None:
         return int(np.argmax(bad))
     coordinates = snapshot.coordinates
     return None if coordinates is None or np.isfinite(coordinates).all() else -1
-
-
-def run_scene(scene, **options) -> Trajectory:
-    """`simulate` the full model of a scene by the scene's own steps.
-
-    Args:
-        scene: to run.
-        options: of `simulate`: `recorder`, `progress`, `stepping`.
-
-    Raises:
-        SimulationError: as `simulate`.
-
-    Examples:
-        >>> import jaxsph
-        >>> from jaxsph.arrangements import Lattice
-        >>> from jaxsph.metrics import kinetic_energy
-        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
-        >>> trajectory = jaxsph.run_scene(scene)
-        >>> energy = kinetic_energy(trajectory.velocity, float(scene.mass))
-        >>> bool(energy[-1] < energy[0])  # viscosity takes it
-        True
-    """
-    return simulate(
-        scene.model(),
-        scene.state,
-        time_step=scene.time_step,
-        steps=scene.steps,
-        steps_per_snapshot=scene.steps_per_snapshot,
-        metadata={"scene": scene.name, "parameters": scene.parameters},
-        **options,
-    )

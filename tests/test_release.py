@@ -66,7 +66,8 @@ def test_the_wheel_holds_the_packages_and_their_data(built):
     }
     assert names >= data | modules
     metadata = f"jaxsph-{jaxsph.__version__}.dist-info"
-    assert {name.partition("/")[0] for name in names} == {"jaxsph", "jaxsph_rom", metadata}
+    tops = {"jaxsph", "jaxsph_rom", "jaxsph_command.py", metadata}
+    assert {name.partition("/")[0] for name in names} == tops
     assert f"{metadata}/licenses/LICENSE" in names
 
 

@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+import equinox as eqx
 import h5py
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.cli import main
 from jaxsph.io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.kernels import WendlandC4
+from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import taylor_green
 from jaxsph.scenes.record import scene_from_record
 
@@ -132,3 +134,68 @@ def test_unknown_record(change, message):
         scene_from_record(scene.name, {**scene.parameters, **change})
     with pytest.raises(ValueError, match="scene: 'x' is not known"):
         scene_from_record("x", scene.parameters)
+
+
+def edited(scene):
+    """Three times as viscous."""
+    return eqx.tree_at(lambda s: s.effects[2].viscosity, scene, 3 * scene.effects[2].viscosity)
+
+
+class Cut(Exception):
+    """What stops a run."""
+
+
+def cut_after(snapshots):
+    def report(steps):
+        nonlocal snapshots
+        snapshots -= 1
+        if not snapshots:
+            raise Cut
+
+    return report
+
+
+def test_an_edited_scene_goes_on_as_it_is_or_not_at_all(tmp_path, capsys):
+    scene = edited(taylor_green(16, arrangement=Lattice(), end_time=0.16))
+    path = tmp_path / "t.h5"
+    with pytest.raises(Cut):
+        jaxsph.run_scene(scene, path, progress=cut_after(3))
+    before = path.read_bytes()
+    assert main(["run", "taylor-green", "--resume", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert "effects[2].viscosity is 0.03 (float64) there and 0.01 (float64) here" in error
+    assert error.count("\n") == 1
+    with pytest.raises(TrajectoryFileError, match="holds another run .effects"):
+        jaxsph.run_scene(taylor_green(16, arrangement=Lattice(), end_time=0.16), path)
+    assert path.read_bytes() == before
+    done = []
+    found, wanted = jaxsph.run_scene(scene, path, progress=done.append), jaxsph.run_scene(scene)
+    assert sum(done) == scene.steps - 6
+    energy = [kinetic_energy(run.velocity[-1], 1.0) for run in (found, wanted)]
+    np.testing.assert_allclose(*energy, rtol=1e-12)
+    assert jaxsph.run_scene(scene, path, progress=done.append).time[-1] == wanted.time[-1]
+    assert sum(done) == scene.steps - 6  # it was read
+
+
+def test_a_finished_run_goes_on_to_a_later_end(tmp_path, capsys):
+    run = ["run", "taylor-green", "--resolution", "16", "--arrangement", "jittered", "--t-end"]
+    path = tmp_path / "short" / "trajectory.h5"
+    assert main([*run, "0.08", "--out", str(path.parent)]) == 0
+    assert main([*run, "0.12", "--out", str(tmp_path / "long")]) == 0
+    resume = ["run", "taylor-green", "--resume", str(path), "--t-end"]
+    for end, message in (("0.06", "run has come to t = 0.08 s"), ("0.095", "do not divide")):
+        capsys.readouterr()
+        assert main([*resume, end]) == 2
+        assert message in capsys.readouterr().err
+    branch = ["--from-step", "8", "--out", str(tmp_path / "branch")]
+    assert main([*resume, "0.12", *branch]) == 0
+    assert main([*resume, "0.12"]) == 0
+    wanted = read_trajectory(tmp_path / "long" / "trajectory.h5")
+    for name in (path, tmp_path / "branch" / "trajectory.h5"):
+        found = read_trajectory(name)
+        for field in FIELDS:
+            a, b = getattr(found, field), getattr(wanted, field)
+            assert np.max(np.abs(a - b)) <= 1e-12 * np.max(np.abs(b)), field
+        assert found.metadata["parameters"] == wanted.metadata["parameters"]
+        kept, like = read_checkpoint(name), read_checkpoint(tmp_path / "long" / "trajectory.h5")
+        assert (kept.steps, kept.complete, kept.content) == (12, True, like.content)

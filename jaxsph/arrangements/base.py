@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import abc
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from jaxtyping import Array, Float
 
 from ..pairs import Space
+from ..record import record
 
 
 @dataclass(frozen=True)
@@ -27,4 +28,5 @@ class Arrangement(abc.ABC):
 
     def record(self) -> dict:
         """The rule and its settings, JSON-like."""
-        return {"rule": type(self).__name__, **asdict(self)}
+        kept = record(self)
+        return {"rule": kept} if isinstance(kept, str) else kept

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 
 from ..arrangements import Lattice
+from ..content import content, differences
 from ..io import Checkpoint, TrajectoryWriter, check_target, read_checkpoint
 from ..particles import ParticleState
 from ..scenes import Scene
@@ -16,8 +18,12 @@ from ..scenes.record import scene_from_record
 from .errors import Parser
 from .options import positive_float, whole_number
 from .recorded import REPORT, simulate_and_report
+from .scene_functions import is_file, made
+from .scene_options import scene_settings
 
 _COSTLY = ("Packed", "Stirred")  # to make, and as many particles as the lattice
+_END = ("end_time", "parameters.end_time")  # what of the content tells the end
+_OF_NO_RECORD = ("state.", "made_by")  # the start is in the file; steps are chosen again
 _SAME_TIME = 0.01  # snapshot intervals by which a given time may be off that of a snapshot
 
 
@@ -57,7 +63,7 @@ def check_resume_options(options, scene_options: list[str]) -> None:
         raise ValueError(
             "--from-step, --from-time: the run goes on in a new file; give its folder by --out."
         )
-    given = list(scene_options)
+    given = [option for option in scene_options if option != "--t-end"]
     given += ["--out"] if options.out is not None and not branch else []
     given += ["--overwrite"] if options.overwrite else []
     if given:
@@ -66,11 +72,16 @@ def check_resume_options(options, scene_options: list[str]) -> None:
         )
 
 
-def resume(options) -> int:
-    """Go on with the run in a file, in that file or, from an earlier snapshot, in a new one."""
+def resume(options, make: Callable[..., Scene]) -> int:
+    """Go on with the run in a file, in that file or, from an earlier snapshot, in a new one.
+
+    Args:
+        options: of the command.
+        make: the scene's function; one of the user's own is given the settings again.
+    """
     path = options.resume
     checkpoint = read_checkpoint(path)
-    if checkpoint.scene != options.scene:
+    if not is_file(options.scene) and checkpoint.scene != options.scene:
         raise ValueError(
             f"{path}: holds a run of scene {checkpoint.scene}, not of {options.scene}; "
             f"name that scene or another file."
@@ -80,22 +91,27 @@ def resume(options) -> int:
         checkpoint = read_checkpoint(path, _wanted_step(options, checkpoint))
         target = options.out / "trajectory.h5"
         check_target(target, overwrite=False)
-        if checkpoint.step == checkpoint.steps:
+        if checkpoint.step == checkpoint.steps and options.t_end is None:
             raise ValueError(f"{path}: step {checkpoint.step} is its last; name an earlier one.")
-    elif _ended(path, checkpoint):
+    elif options.t_end is None and _ended(path, checkpoint):
         end = checkpoint.step * checkpoint.time_step
         print(f"{path} is complete ({checkpoint.step} steps to t = {end:g} s): nothing to do.")
         return 0
     check_target(target.with_name(REPORT))
-    with jax.enable_x64(checkpoint.parameters.get("dtype") != "float32"):
-        scene = _restored(path, checkpoint)
+    precision = options.precision or checkpoint.parameters.get("dtype")
+    with jax.enable_x64(precision != "float32"):
+        if is_file(options.scene):
+            scene = _made_again(path, checkpoint, options, make)
+        else:
+            scene = _restored(path, checkpoint, options.t_end)
         # room for neighbours as at the run's own start, so that sums are rounded alike
         start = scene.state if checkpoint.state is None else _arrays(read_checkpoint(path, 0).state)
+        longer = None if options.t_end is None else scene
         model = scene.model(start, options.capacity_margin)
         if _branches(options):
-            writer = TrajectoryWriter.branch(path, target, checkpoint.step)
+            writer = TrajectoryWriter.branch(path, target, checkpoint.step, longer)
         else:
-            writer = TrajectoryWriter.append_to(path)
+            writer = TrajectoryWriter.append_to(path, longer)
         return simulate_and_report(options, scene, model, writer, max(0, checkpoint.step))
 
 
@@ -132,8 +148,8 @@ def _ended(path: Path, checkpoint: Checkpoint) -> bool:
     return checkpoint.complete
 
 
-def _restored(path: Path, checkpoint: Checkpoint) -> Scene:
-    """The scene of a file, its particles as they were stored."""
+def _restored(path: Path, checkpoint: Checkpoint, end_time: float | None) -> Scene:
+    """The scene of a file, its particles as they were stored, up to another end if one is given."""
     state = checkpoint.state
     rule = checkpoint.parameters.get("arrangement", {}).get("rule")
     spared = Lattice() if state is not None and rule in _COSTLY else None
@@ -142,13 +158,60 @@ def _restored(path: Path, checkpoint: Checkpoint) -> Scene:
     fits = all(getattr(scene, name) == getattr(checkpoint, name) for name in same)
     if state is not None:
         fits = fits and state.position.shape == scene.state.position.shape
-        scene = dataclasses.replace(scene, state=_arrays(state))
     if not fits:
         raise ValueError(
             f"{path}: scene {checkpoint.scene} now has other steps or particles than when the file "
             "was written; resume with the version of jaxsph that wrote it, or run it anew."
         )
-    return scene
+    _check_unedited(path, checkpoint, scene)
+    if state is not None:
+        scene = dataclasses.replace(scene, state=_arrays(state))
+    return scene if end_time is None else _longer(scene, end_time, checkpoint)
+
+
+def _made_again(path: Path, checkpoint: Checkpoint, options, make) -> Scene:
+    """The scene of the user's own function, which must be the file's; its particles as stored."""
+    precision = options.precision or checkpoint.parameters.get("dtype", "float64")
+    scene = made(make, scene_settings(options, make, precision))
+    wanted = content(scene)
+    if options.t_end is not None and checkpoint.content is not None:
+        _check_later(options.t_end, scene, checkpoint)
+        end = {name: wanted[name] for name in _END if name in wanted}
+        checkpoint = dataclasses.replace(checkpoint, content=checkpoint.content | end)
+    checkpoint.check(path, wanted)
+    if checkpoint.state is None:
+        return scene
+    return dataclasses.replace(scene, state=_arrays(checkpoint.state))
+
+
+def _check_unedited(path: Path, checkpoint: Checkpoint, scene: Scene) -> None:
+    """A ValueError if what was run is not what the record of its parameters makes."""
+    if checkpoint.content is None:  # an old file
+        return
+    kept, made = (
+        {name: text for name, text in found.items() if not name.startswith(_OF_NO_RECORD)}
+        for found in (checkpoint.content, content(scene))
+    )
+    other = differences(kept, made)
+    if other:
+        raise ValueError(
+            f"{path}: its run was of another {scene.name} than its record makes ({other}): edited "
+            "in Python, or of another version; go on there, by jaxsph.run_scene(scene, path)."
+        )
+
+
+def _longer(scene: Scene, end_time: float, checkpoint: Checkpoint) -> Scene:
+    """The scene up to a later time [s]."""
+    _check_later(end_time, scene, checkpoint)
+    parameters = {**scene.parameters, "end_time": end_time}
+    return dataclasses.replace(scene, end_time=end_time, parameters=parameters)
+
+
+def _check_later(end_time: float, scene: Scene, checkpoint: Checkpoint) -> None:
+    """A ValueError if a run has come as far already."""
+    done = max(0, checkpoint.step) * scene.time_step
+    if not end_time > done * (1.0 + 1e-9):
+        raise ValueError(f"--t-end: the run has come to t = {done:g} s; give a later time.")
 
 
 def _arrays(state: ParticleState) -> ParticleState:

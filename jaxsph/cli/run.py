@@ -7,14 +7,13 @@ from pathlib import Path
 import jax
 
 from ..io import TrajectoryWriter, check_target
-from ..scenes import SCENES
 from .options import STEPPING, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
+from .scene_functions import is_file, made, scene_function
 from .scene_options import (
     add_member_options,
     add_scene_options,
-    check_scene,
     given,
     scene_settings,
 )
@@ -51,21 +50,21 @@ def add_to(commands) -> None:
 
 
 def _run(options) -> int:
-    check_scene(options)
+    make = scene_function(options.scene)
     if options.json is not None:
         check_target(options.json)
-    check_resume_options(options, given(options))
+    check_resume_options(options, [] if is_file(options.scene) else given(options))
     if options.resume is not None:
-        return resume(options)
-    path = (Path("out", options.scene) if options.out is None else options.out) / "trajectory.h5"
+        return resume(options, make)
+    name = make.__name__ if is_file(options.scene) else options.scene
+    path = (Path("out", name) if options.out is None else options.out) / "trajectory.h5"
     check_target(path, options.overwrite)
     check_target(path.with_name(REPORT))
     precision = options.precision or "float64"
     with jax.enable_x64(precision == "float64"):
-        make = SCENES[options.scene]
         settings = scene_settings(options, make, precision)
-        make(**{**settings, **unpacked(make)})  # meets all bad input before the packing
-        scene = make(**settings)
+        made(make, {**settings, **unpacked(make)})  # meets all bad input before the packing
+        scene = made(make, settings)
         model = scene.model(margin=options.capacity_margin)
         writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite)
         return simulate_and_report(options, scene, model, writer, 0)

@@ -8,6 +8,7 @@ from ..scenes import SCENES
 from ..scenes.lid_driven_cavity import LIDS
 from ..schemes import SCHEMES
 from .options import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
+from .scene_functions import own_settings, setting
 from .scenes import takes
 
 # options that say what is run, and the scene's name for each; a resumed run has them from its file
@@ -28,7 +29,12 @@ _NAMES = {
 
 def add_scene_options(add) -> None:
     """Add the scene, and the settings that members of a sweep share."""
-    add("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
+    add("scene", metavar="SCENE",
+        help=f"one of {', '.join(SCENES)}, or a function of your own that returns one, as "
+        "my_scene.py:function")  # fmt: skip
+    add("--set", type=setting, action="append", default=[], metavar="NAME=VALUE",
+        help="any other setting that the scene's function takes (`jaxsph scenes SCENE` lists "
+        "them); may be repeated")  # fmt: skip
     add("--resolution", type=positive_int, metavar="N", help="particles per longest side")
     add("--t-end", type=positive_float, metavar="T", help="end time [s]")
     add("--scale", choices=SCALES, help="size of the run (default: small)")
@@ -50,17 +56,10 @@ def add_member_options(add) -> None:
     add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
 
 
-def check_scene(options) -> None:
-    """Raise a ValueError if the scene is not known."""
-    if options.scene not in SCENES:
-        raise ValueError(
-            f"scene: {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
-        )
-
-
 def given(options) -> list[str]:
     """The settings that are given, as they are typed."""
-    return [_flag(name) for name in _NAMES if getattr(options, name) is not None]
+    named = [_flag(name) for name in _NAMES if getattr(options, name) is not None]
+    return named + (["--set"] if options.set else [])
 
 
 def scene_settings(options, make, precision: str) -> dict[str, Any]:
@@ -78,6 +77,7 @@ def scene_settings(options, make, precision: str) -> dict[str, Any]:
         settings["arrangement"] = rule(seed=options.seed or 0)
     if "scheme" in settings:
         settings["scheme"] = SCHEMES[options.scheme]
+    settings |= own_settings(make, options.set)
     return {**settings, "dtype": precision} if "dtype" in takes(make) else settings
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from ..arrangements import Lattice
 from ..scenes import SCENES
-from .options import SCALES
+from .options import SCALES, print_rows
+from .scene_functions import argument_lines, scene_function
 
 
 def add_to(commands) -> None:
@@ -15,11 +16,23 @@ def add_to(commands) -> None:
     scenes = commands.add_parser("scenes", help="list the scenes, their effects and sizes")
     scenes.set_defaults(command=_list_scenes)
     scenes.add_argument(
+        "scene",
+        nargs="?",
+        metavar="SCENE",
+        help="tell what this one can be given: a name, or my_scene.py:function",
+    )
+    scenes.add_argument(
         "--scale", choices=SCALES, action="append", help="sizes to list (default: small)"
     )
 
 
 def _list_scenes(options) -> int:
+    if options.scene is not None:
+        make = scene_function(options.scene)
+        summary = (inspect.getdoc(make) or "").partition("\n\n")[0]
+        print(f"{options.scene}: {' '.join(summary.split())}")
+        print_rows({f"  {name}": line for name, line in argument_lines(make).items()})
+        return 0
     for name, make in SCENES.items():
         print(f"{name}: {(inspect.getdoc(make) or '').partition(chr(10))[0]}")
         for number, scale in enumerate(options.scale or SCALES[:1]):

@@ -8,9 +8,11 @@ from typing import Any
 
 from ..history import energy_unit, read_history
 from ..io import Overview, check_target, read_overview, read_snapshot
+from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
 from .options import print_rows
+from .show_contents import contents, file_format
 
 _SAMPLES = 20  # snapshots that are read of a long run, beside the last one
 
@@ -19,13 +21,14 @@ def add_to(commands) -> None:
     """Add the command to a parser's commands."""
     show = commands.add_parser(
         "show",
-        help="a quick look at a run",
+        help="a quick look at a run, or at any other file of this project",
         description="Tell what a trajectory file holds: the scene, how far the run has come, and "
-        "what its particles do. The file may still be written.",
+        "what its particles do. The file may still be written. Of other files, sweeps, models and "
+        "predictions, tell what is in them.",
     )
     show.set_defaults(command=_show)
     add = show.add_argument
-    add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run")
+    add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, or another file")
     add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
     add("--json", type=Path, metavar="FILE", help="write what is shown to FILE as well")
 
@@ -34,6 +37,11 @@ def _show(options) -> int:
     for target in (options.figure, options.json):
         if target is not None:
             check_target(target)
+    if file_format(options.file) not in (None, FORMAT):
+        if options.figure is not None:
+            raise ValueError(f"--figure: {options.file} is no run, so there is nothing to draw.")
+        rows = {"file": f"{options.file}, {_size(options.file.stat().st_size)}"}
+        return _tell(rows | contents(options.file), options.json)
     overview = read_overview(options.file)
     measures = _measures(options.file, overview)
     print_rows({"file": f"{options.file}, {_size(overview.size)}", **_rows(overview, measures)})
@@ -45,6 +53,14 @@ def _show(options) -> int:
 
         save(snapshot_figure(*read_snapshot(options.file)), options.figure)
         print_rows({"figure": str(options.figure)})
+    return 0
+
+
+def _tell(rows: dict[str, str], target: Path | None) -> int:
+    print_rows(rows)
+    if target is not None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(json.dumps(rows, indent=2) + "\n")
     return 0
 
 

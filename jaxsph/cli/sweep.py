@@ -11,10 +11,10 @@ import jax
 import numpy as np
 
 from ..integrate import explanation
-from ..scenes import SCENES
 from ..sweeps import sweep
 from .options import positive_int, print_rows, progress_bar, reynolds_numbers, seed
-from .scene_options import add_scene_options, check_scene, scene_settings
+from .scene_functions import is_file, made, scene_function
+from .scene_options import add_scene_options, scene_settings
 
 _FAULTS_SHOWN = 5
 
@@ -41,16 +41,16 @@ def add_to(commands) -> None:
 
 
 def _sweep(options) -> int:
-    check_scene(options)
-    path = options.out or Path("out", options.scene, "sweep.h5")
+    make = scene_function(options.scene)
+    name = make.__name__ if is_file(options.scene) else options.scene
+    path = options.out or Path("out", name, "sweep.h5")
     precision = options.precision or "float64"
-    make = SCENES[options.scene]
     pairs = itertools.product(sum(options.reynolds, []), options.seed or [None])
     with jax.enable_x64(precision == "float64"):
         scenes = []
         for reynolds, number in pairs:
             member = argparse.Namespace(**{**vars(options), "reynolds": reynolds, "seed": number})
-            scenes.append(make(**scene_settings(member, make, precision)))
+            scenes.append(made(make, scene_settings(member, make, precision)))
         before = clock.perf_counter()
         with progress_bar(len(scenes), "run") as bar:
             status = sweep(scenes, path, batch=options.batch, progress=bar.update)

@@ -1,6 +1,8 @@
 """Files: trajectories in HDF5, and what ParaView reads."""
 
 from .growing_file import check_target as check_target
+from .growing_file import unwritable as unwritable
+from .lock import Lock as Lock
 from .overview import Overview as Overview
 from .overview import read_overview as read_overview
 from .overview import read_snapshot as read_snapshot
@@ -11,3 +13,4 @@ from .trajectory_file import read_checkpoint as read_checkpoint
 from .trajectory_file import read_trajectory as read_trajectory
 from .trajectory_writer import TrajectoryWriter as TrajectoryWriter
 from .vtkhdf import write_vtkhdf as write_vtkhdf
+from .whole_file import whole_file as whole_file

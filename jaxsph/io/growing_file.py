@@ -50,6 +50,7 @@ def begin(path: Path, fill: Callable[[h5py.File], None]) -> h5py.File:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = h5py.File(part, "w", **_OPENING)
     except OSError as error:
+        part.unlink(missing_ok=True)
         raise unwritable(path, error) from None
     try:
         fill(file)

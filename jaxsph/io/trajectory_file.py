@@ -6,7 +6,7 @@ import functools
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..content import differences
 from ..particles import ParticleState
 from ..trajectory import Trajectory
 from .unclosed_file import open_to_read
@@ -51,6 +52,7 @@ class Checkpoint:
         complete: whether the run has ended.
         step: number of the last stored step, or of the one asked for; -1 if there is none.
         state: the particles at that step.
+        content: of the scene and of what else made the run; None in files from before it was kept.
     """
 
     scene: str
@@ -61,6 +63,24 @@ class Checkpoint:
     complete: bool
     step: int
     state: ParticleState | None
+    content: dict[str, str] | None = None
+
+    def check(self, path: str | os.PathLike, wanted: Mapping[str, str]) -> None:
+        """Make sure that the run in a file is the one that is wanted.
+
+        Raises:
+            TrajectoryFileError: naming what differs.
+        """
+        if self.content is None:
+            raise TrajectoryFileError(
+                f"{path}: was written by a version of jaxsph that did not keep what was run, so it "
+                "may be another run; remove it, or name another folder."
+            )
+        other = differences(self.content, wanted)
+        if other:
+            raise TrajectoryFileError(
+                f"{path}: holds another run ({other}); name another folder, or remove it."
+            )
 
 
 class _Damaged(TrajectoryFileError):
@@ -129,6 +149,7 @@ def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpo
             complete=bool(file.attrs["complete"]),
             step=int(file["step"][count - 1]) if count else -1,
             state=state,
+            content=json.loads(_text(file.attrs["content"])) if "content" in file.attrs else None,
         )
 
 

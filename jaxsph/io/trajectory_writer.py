@@ -9,15 +9,19 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from ..content import content
 from ..environment import versions
+from ..record import plain
 from ..trajectory import Snapshot
 from .growing_file import COMPRESSION, abandon, add_dataset, begin, check_target, unwritable
+from .lock import Lock
 from .trajectory_file import (
     FORMAT,
     SCHEMA_VERSION,
@@ -35,7 +39,7 @@ class TrajectoryWriter:
     """A trajectory file being written: a `Recorder` for `simulate`, and a context manager.
 
     Make one by `create`, `append_to` or `branch`. `last_step` is the last step stored, -1 if there
-    is none.
+    is none. Until it is closed no other writer may have the file.
 
     Examples:
         >>> import jaxsph
@@ -49,9 +53,13 @@ class TrajectoryWriter:
         256
     """
 
-    def __init__(self, path: Path, file: h5py.File):
-        self.path = path
-        self._file = file
+    def __init__(self, path: Path, fill: Callable[[h5py.File], None]):
+        self.path, self._lock = path, Lock(path)
+        try:
+            self._file = file = begin(path, fill)
+        except BaseException:
+            self._lock.release()
+            raise
         self._count = len(file["step"])
         self.last_step = int(file["step"][-1]) if self._count else -1
         self.last_time = float(file["time"][-1]) if self._count else None
@@ -64,6 +72,7 @@ class TrajectoryWriter:
         *,
         modes: int | None = None,
         metadata: dict | None = None,
+        made_by: Mapping[str, str] | None = None,
         overwrite: bool = False,
     ) -> TrajectoryWriter:
         """A new file for a run of a scene; folders are made as needed.
@@ -74,14 +83,16 @@ class TrajectoryWriter:
                 they have none), and the particles' number and precision.
             modes: number of reduced coordinates that snapshots carry, if any.
             metadata: kept with the trajectory, JSON-like.
+            made_by: the `content` of what makes the run; that of the scene if none is given.
             overwrite: whether an existing file may be replaced.
 
         Raises:
-            TrajectoryFileError: if the file exists or cannot be made.
+            TrajectoryFileError: if the file exists, cannot be made, or is being written.
         """
         path = Path(path)
         check_target(path, overwrite)
         state = scene.state
+        made_by = content(scene) if made_by is None else made_by
         shapes = {name: getattr(state, name).shape for name in ("position", "velocity", "density")}
         shapes["pressure"] = shapes["density"]
         if modes is not None:
@@ -95,6 +106,7 @@ class TrajectoryWriter:
             file.attrs["versions"] = json.dumps(versions())
             file.attrs["scene"] = scene.name
             file.attrs["parameters"] = _to_json(scene.parameters)
+            file.attrs["content"] = json.dumps(dict(made_by))
             file.attrs["time_step"] = float(scene.time_step)
             file.attrs["steps"] = int(scene.steps)
             file.attrs["steps_per_snapshot"] = int(scene.steps_per_snapshot)
@@ -110,33 +122,37 @@ class TrajectoryWriter:
             add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
             add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
 
-        return cls(path, begin(path, fill))
+        return cls(path, fill)
 
     @classmethod
-    def append_to(cls, path: str | os.PathLike) -> TrajectoryWriter:
+    def append_to(cls, path: str | os.PathLike, scene: Any = None) -> TrajectoryWriter:
         """Go on with a file whose run was cut short, from its last whole snapshot.
 
         The snapshots go into a copy, which then takes the file's place: there is a whole file at
         any time.
+
+        Args:
+            path: of the file.
+            scene: that the run goes on as, its end another one say; as it was if none is given.
 
         Raises:
             TrajectoryFileError: if the file cannot be read or written.
         """
         path = Path(path)
         check_target(path, overwrite=True)
-        with opened(path) as (source, count):
 
-            def fill(file):
-                _copy_attributes(source, file)
+        def fill(file):
+            with opened(path) as (source, count):
+                _copy_attributes(source, file, scene)
                 for name in source:
                     source.copy(name, file)
                     file[name].resize(count, 0)
 
-            return cls(path, begin(path, fill))
+        return cls(path, fill)
 
     @classmethod
     def branch(
-        cls, source: str | os.PathLike, path: str | os.PathLike, step: int
+        cls, source: str | os.PathLike, path: str | os.PathLike, step: int, scene: Any = None
     ) -> TrajectoryWriter:
         """A new file that goes on from a snapshot of another one, which stays as it is.
 
@@ -146,6 +162,7 @@ class TrajectoryWriter:
             source: of the other file.
             path: of the new one; folders are made as needed.
             step: of the snapshot to go on from.
+            scene: as for `append_to`.
 
         Raises:
             TrajectoryFileError: if the source has no snapshot of that step or cannot be read, or
@@ -157,7 +174,7 @@ class TrajectoryWriter:
             count = count_up_to(source, old["step"][:stored], step)
 
             def fill(file):
-                _copy_attributes(old, file)
+                _copy_attributes(old, file, scene)
                 metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
                 for name in old:
@@ -170,7 +187,7 @@ class TrajectoryWriter:
                     for k in range(count):
                         file[name][k] = like[k]
 
-            return cls(path, begin(path, fill))
+            return cls(path, fill)
 
     def append(self, step: int, time: float, snapshot: Snapshot) -> None:
         """Store a snapshot; it is safe once this returns. The last one again is left out.
@@ -181,23 +198,23 @@ class TrajectoryWriter:
         if step == self.last_step:
             return
         fields = {name: getattr(snapshot, name) for name in UNITS if hasattr(snapshot, name)}
-        try:
-            for name, value in {**fields, "time": time, "step": step}.items():
-                if value is not None and name in self._file:
-                    dataset = self._file[name]
-                    dataset.resize(self._count + 1, 0)
-                    dataset[self._count] = np.asarray(value)
-                    dataset.flush()
-        except (OSError, RuntimeError) as error:
-            abandon(self._file)
-            raise unwritable(self.path, error) from None
+        self._tried(lambda: self._store({**fields, "time": time, "step": step}))
         self._count, self.last_step, self.last_time = self._count + 1, step, time
+
+    def _store(self, fields: dict[str, Any]) -> None:
+        for name, value in fields.items():
+            if value is not None and name in self._file:
+                dataset = self._file[name]
+                dataset.resize(self._count + 1, 0)
+                dataset[self._count] = np.asarray(value)
+                dataset.flush()
 
     def finish(self, metadata: dict | None = None) -> None:
         """Mark the run complete, with the metadata of its trajectory.
 
         Raises:
-            TrajectoryFileError: if the metadata do not fit into the room left for them.
+            TrajectoryFileError: if the metadata do not fit into the room left for them, or the
+                disk takes no more.
         """
         attributes = self._file.attrs
         if metadata is not None:
@@ -208,13 +225,27 @@ class TrajectoryWriter:
                     f"metadata: {len(text)} bytes do not fit into {self.path}, which has room for "
                     f"{room}; keep large results elsewhere."
                 )
-            attributes.modify("metadata", text)
-        attributes.modify("complete", True)
-        self._file.flush()
+            self._tried(lambda: attributes.modify("metadata", text))
+        self._tried(lambda: attributes.modify("complete", True))
+        self._tried(self._file.flush)
 
     def close(self) -> None:
-        """Close the file; nothing happens if it is closed."""
-        self._file.close()
+        """Close the file and let others write it; nothing happens if it is closed.
+
+        Raises:
+            TrajectoryFileError: if the disk takes no more; what was stored stays readable.
+        """
+        try:
+            self._tried(self._file.close)
+        finally:
+            self._lock.release()
+
+    def _tried(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except (OSError, RuntimeError) as error:
+            abandon(self._file)
+            raise unwritable(self.path, error) from None
 
     def __enter__(self) -> TrajectoryWriter:
         return self
@@ -223,12 +254,19 @@ class TrajectoryWriter:
         self.close()
 
 
-def _copy_attributes(source: h5py.File, file: h5py.File) -> None:
-    """What a file says of its run, which is not complete."""
+def _copy_attributes(source: h5py.File, file: h5py.File, scene: Any) -> None:
+    """What a file says of its run, which is not complete; of the scene, if another is given."""
     for name, value in source.attrs.items():
         file.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
     file.attrs["complete"] = False
+    if scene is not None:
+        file.attrs["steps"] = int(scene.steps)
+        file.attrs["parameters"] = _to_json(scene.parameters)
+        if "content" in source.attrs:  # its particles are no longer those of the start
+            kept = json.loads(source.attrs["content"])
+            start = {name: text for name, text in kept.items() if name.startswith("state.")}
+            file.attrs["content"] = json.dumps({**content(scene), **start})
 
 
 def _to_json(value: Any) -> str:
-    return json.dumps(value, default=lambda array: np.asarray(array).tolist())
+    return json.dumps(plain(value, "parameters"))

@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 
 from ..trajectory import Trajectory
-from .growing_file import check_target, unwritable
 from .snapshot_blocks import snapshot_blocks
-from .trajectory_file import UNITS, TrajectoryFileError
+from .trajectory_file import UNITS
+from .whole_file import whole_file
 
 EXPORTED = ("velocity", "density", "pressure")
 _CELLS = ("Vertices", "Lines", "Polygons", "Strips")  # in the order of `Steps/CellOffsets`
@@ -57,25 +57,14 @@ def write_vtkhdf(
     blocks = snapshot_blocks(source, 1, every)
     if path.exists() and path.samefile(source):
         raise ValueError(f"{path}: is the trajectory itself; choose another file.")
-    check_target(path)
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(part, "w") as file:
-            root = file.create_group("VTKHDF")
-            for number, block in enumerate(blocks):
-                if number == 0:
-                    _begin(root, block, fields)
-                _append(root, block, fields, number)
-                if progress is not None:
-                    progress(1)
-        os.replace(part, path)
-    except TrajectoryFileError:
-        raise
-    except (OSError, RuntimeError) as error:
-        raise unwritable(path, error) from None
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(path) as file:
+        root = file.create_group("VTKHDF")
+        for number, block in enumerate(blocks):
+            if number == 0:
+                _begin(root, block, fields)
+            _append(root, block, fields, number)
+            if progress is not None:
+                progress(1)
     return path
 
 

@@ -15,6 +15,7 @@ from ..fluid import Fluid
 from ..kernels import Kernel, WendlandC2
 from ..pairs import Space
 from ..particles import ParticleState, in_dtype
+from ..record import record
 from ..walls import Region, Walls
 from ..walls.walls import fill
 from .fitting import fitted_resolution
@@ -118,7 +119,7 @@ def composed(
             "end_time": end_time,
             "mach": mach,
             "arrangement": arrangement.record(),
-            "kernel": type(kernel).__name__,
+            "kernel": record(kernel),
             "dtype": str(dtype),
         },
         walls=around,

@@ -10,6 +10,7 @@ from ..domain import Box
 from ..effects import Effect
 from ..effects.base import VISCOUS_LIMIT
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
@@ -89,7 +90,7 @@ def couette(
         parameters={
             "scale": scale,
             "reynolds": reynolds,
-            "wall_velocity": None if wall_velocity is None else wall_velocity.name,
+            "wall_velocity": None if wall_velocity is None else record(wall_velocity),
         },
     )
 

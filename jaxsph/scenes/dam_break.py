@@ -8,6 +8,7 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import ArtificialViscosity, Effect, Gravity, NoSlip
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
@@ -106,10 +107,10 @@ def dam_break(
         dtype=dtype,
         parameters={
             "scale": scale,
-            "scheme": type(scheme).__name__,
+            "scheme": record(scheme),
             "column": column,
             "tank": tank,
             "alpha": alpha,
-            "wall_velocity": wall_velocity.name,
+            "wall_velocity": record(wall_velocity),
         },
     )

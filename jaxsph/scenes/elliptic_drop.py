@@ -10,6 +10,7 @@ from ..arrangements import Arrangement, Rings
 from ..domain import Box
 from ..effects import ArtificialViscosity, CentralForce
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BallRegion
 from .composed import composed, pick_scale, positive
@@ -112,5 +113,5 @@ def elliptic_drop(
         arrangement=Rings() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "pull": pull, "alpha": alpha, "scheme": type(scheme).__name__},
+        parameters={"scale": scale, "pull": pull, "alpha": alpha, "scheme": record(scheme)},
     )

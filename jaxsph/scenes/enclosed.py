@@ -9,6 +9,7 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import BodyForce, Effect
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Scheme
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
@@ -88,5 +89,5 @@ def enclosed_flow(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={**parameters, "layers": layers, "scheme": type(scheme).__name__},
+        parameters={**parameters, "layers": layers, "scheme": record(scheme)},
     )

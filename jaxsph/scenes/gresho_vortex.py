@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from .composed import composed, pick_scale, positive
 from .scales import Scale
@@ -87,7 +88,7 @@ def gresho_vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "scheme": type(scheme).__name__},
+        parameters={"scale": scale, "scheme": record(scheme)},
     )
 
 

@@ -14,6 +14,7 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import ArtificialViscosity, Gravity
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, MovingBody, Walls
 from .composed import composed, pick_scale, positive
@@ -152,6 +153,6 @@ def piston_wave_maker(
             "stroke": stroke,
             "period": period,
             "alpha": alpha,
-            "scheme": type(scheme).__name__,
+            "scheme": record(scheme),
         },
     )

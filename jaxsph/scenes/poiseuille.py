@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from ..arrangements import Arrangement, JitteredLattice
 from ..effects import Effect, Gravity
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
@@ -76,6 +77,6 @@ def poiseuille(
         parameters={
             "scale": scale,
             "reynolds": reynolds,
-            "wall_velocity": None if wall_velocity is None else wall_velocity.name,
+            "wall_velocity": None if wall_velocity is None else record(wall_velocity),
         },
     )

@@ -10,8 +10,16 @@ from .. import arrangements, effects, kernels, schemes
 from ..arrangements import Arrangement
 from ..effects import Effect
 from ..kernels import Kernel
+from ..record import restored
 from ..schemes import DeltaPlus, Scheme
 from .scene import Scene
+
+_RULES = {
+    "kernel": (Kernel, kernels),
+    "scheme": (Scheme, schemes),
+    "wall_velocity": (Effect, effects),
+    "arrangement": (Arrangement, arrangements),
+}
 
 
 def scene_from_record(
@@ -40,34 +48,22 @@ def scene_from_record(
             "another version."
         )
     options = dict(parameters)
-    if "kernel" in options:
-        options["kernel"] = _named(kernels, Kernel, options["kernel"])()
     if "scheme" in inspect.signature(make).parameters:  # records from before there were any lack it
-        named = options.get("scheme", DeltaPlus.__name__)
-        options["scheme"] = _named(schemes, Scheme, named)()
-    if options.get("wall_velocity") is not None:
-        options["wall_velocity"] = _named(effects, Effect, options["wall_velocity"])()
+        options.setdefault("scheme", DeltaPlus.__name__)
     if arrangement is not None:
         options["arrangement"] = arrangement
-    elif "arrangement" in options:
-        settings = dict(options["arrangement"])
-        rule = _named(arrangements, Arrangement, settings.pop("rule", None))
-        try:
-            options["arrangement"] = rule(**settings)
-        except TypeError as error:
-            raise ValueError(f"arrangement: {error}.") from None
-    return dataclasses.replace(make(**options), parameters=parameters)
+    return dataclasses.replace(make(**rules_restored(options)), parameters=parameters)
 
 
-def _named(module, base: type, name: Any) -> type:
-    """The class of that name which `module` offers."""
-    offered = {
-        key: value
-        for key, value in vars(module).items()
-        if isinstance(value, type) and issubclass(value, base) and not inspect.isabstract(value)
+def rules_restored(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a scene with the rules among them made from their records.
+
+    Raises:
+        ValueError: if a rule is not known.
+    """
+    made = {
+        key: restored(settings[key], base, package)
+        for key, (base, package) in _RULES.items()
+        if settings.get(key) is not None and not isinstance(settings[key], base)
     }
-    if name not in offered:
-        raise ValueError(
-            f"{base.__name__.lower()}: {name!r} is not known; choose one of {', '.join(offered)}."
-        )
-    return offered[name]
+    return settings | made

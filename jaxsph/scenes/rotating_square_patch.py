@@ -7,6 +7,7 @@ import numpy as np
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion
 from .composed import composed, pick_scale, positive
@@ -99,5 +100,5 @@ def rotating_square_patch(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "scheme": type(scheme).__name__},
+        parameters={"scale": scale, "scheme": record(scheme)},
     )

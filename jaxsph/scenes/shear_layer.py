@@ -10,6 +10,7 @@ from ..arrangements import Arrangement
 from ..domain import Box
 from ..effects import BackgroundPressure
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from .composed import composed, pick_scale, positive
 from .scales import Scale
@@ -108,6 +109,6 @@ def shear_layer(
             "reynolds": reynolds,
             "thickness": thickness,
             "background_pressure": background_pressure,
-            "scheme": type(scheme).__name__,
+            "scheme": record(scheme),
         },
     )

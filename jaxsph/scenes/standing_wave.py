@@ -11,6 +11,7 @@ from ..arrangements import Arrangement, Lattice
 from ..domain import Box
 from ..effects import Gravity, LaminarViscosity
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, Walls
 from .composed import composed, pick_scale, positive
@@ -130,6 +131,6 @@ def standing_wave(
             "scale": scale,
             "reynolds": reynolds,
             "amplitude": amplitude,
-            "scheme": type(scheme).__name__,
+            "scheme": record(scheme),
         },
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
+from ..record import record
 from ..schemes import Consistent, DeltaPlus, Scheme
 from . import taylor_green_solution as exact
 from .composed import composed, pick_scale, positive
@@ -116,5 +117,5 @@ def _vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds, "scheme": type(scheme).__name__},
+        parameters={"scale": scale, "reynolds": reynolds, "scheme": record(scheme)},
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
@@ -14,6 +16,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from ..compiler_options import COMPILER_OPTIONS
 from ..integrate import FaultCode, integrate
+from ..io import Lock
 from ..scenes import Scene
 from ..trajectory import Snapshot
 from . import sweep_file
@@ -56,15 +59,23 @@ def sweep(
     """
     if batch < 1:
         raise ValueError(f"batch: at least 1, got {batch}.")
-    members, first = stacked(scenes), scenes[0]
+    members = stacked(scenes)
     writes = jax.process_index() == 0
-    if writes:
-        sweep_file.create(path, scenes)
-    code = read_status(path).code if writes else np.empty(len(scenes), np.int32)
+    with Lock(Path(path)) if writes else nullcontext():
+        if writes:
+            sweep_file.create(path, scenes)
+        _fill(path, members, scenes[0], len(scenes), batch, writes, progress)
+    multihost_utils.sync_global_devices("sweep")  # the file is whole for all
+    return read_status(path)
+
+
+def _fill(path, members: Members, first: Scene, count: int, batch: int, writes, progress) -> None:
+    """Run the members that are not in the file yet."""
+    code = read_status(path).code if writes else np.empty(count, np.int32)
     code = multihost_utils.broadcast_one_to_all(code)
     left = np.flatnonzero(code == NOT_RUN)
-    if progress is not None and len(left) < len(scenes):
-        progress(len(scenes) - len(left))
+    if progress is not None and len(left) < count:
+        progress(count - len(left))
     mesh = Mesh(np.asarray(jax.devices()), (_AXIS,))
     for attempt in range(1 + _ENLARGEMENTS):
         run = _compiled(members, first, mesh, batch)
@@ -83,8 +94,6 @@ def sweep(
         if not clumped:
             break
         left, members = np.asarray(clumped), members.enlarged()
-    multihost_utils.sync_global_devices("sweep")  # the file is whole for all
-    return read_status(path)
 
 
 class _Run(NamedTuple):

@@ -16,8 +16,10 @@ import h5py
 import numpy as np
 from jaxtyping import Int
 
+from ..content import content, differences
 from ..environment import versions
-from ..io import check_target
+from ..io import TrajectoryFileError, unwritable, whole_file
+from ..record import plain
 from ..scenes import Scene
 from ..trajectory import Snapshot, Trajectory
 
@@ -57,26 +59,20 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
     """
     path = Path(path)
     first, identity = scenes[0], _identity(scenes)
+    contents = _contents(scenes)
     if path.exists():
-        with _opened(path) as file:
-            if file.attrs["identity"] != identity:
-                raise SweepFileError(
-                    f"{path}: holds another sweep; name another file, or repeat the scenes it was "
-                    "made with to go on with it."
-                )
+        _check(path, identity, contents)
         return
-    check_target(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     state = first.state
     times = 1 + first.steps // first.steps_per_snapshot
     shapes = {"position": state.position.shape, "velocity": state.velocity.shape}
     shapes |= {"density": state.density.shape, "pressure": state.density.shape}
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with h5py.File(unfinished, "w") as file:
+        with whole_file(path) as file:
             file.attrs["format"], file.attrs["schema_version"] = FORMAT, SCHEMA_VERSION
             file.attrs["units"], file.attrs["versions"] = "SI", json.dumps(versions())
             file.attrs["identity"] = identity
+            file["content"] = [json.dumps(content) for content in contents]
             file.attrs["time_step"] = first.time_step
             steps = np.arange(times) * first.steps_per_snapshot
             file["time"] = steps * first.time_step
@@ -90,26 +86,31 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
                 data.attrs["unit"] = _UNITS[name]
             for name in ("code", "step", "particle", "snapshots"):
                 file[name] = np.full(len(scenes), NOT_RUN if name != "snapshots" else 0, np.int32)
-        os.replace(unfinished, path)
-    except OSError as error:
-        raise SweepFileError(
-            f"{path}: cannot be written ({error}); choose another place."
-        ) from None
-    finally:
-        unfinished.unlink(missing_ok=True)
+    except TrajectoryFileError as error:
+        raise SweepFileError(str(error)) from None
 
 
 def store(path: str | os.PathLike, number: int, snapshots: Snapshot, status: Sequence[int]) -> None:
-    """A member's snapshots (S, ...) and its (code, step, particle, good snapshots)."""
-    with h5py.File(path, "r+") as file:
-        for name in _UNITS:
-            file[name][number] = getattr(snapshots, name)
-        file.flush()
-        code, *rest = status
-        for name, value in zip(("step", "particle", "snapshots"), rest, strict=True):
-            file[name][number] = value
-        file.flush()
-        file["code"][number] = code
+    """A member's snapshots (S, ...) and its (code, step, particle, good snapshots).
+
+    Raises:
+        SweepFileError: if they cannot be written; the member then counts as not run.
+    """
+    rows = {name: getattr(snapshots, name) for name in _UNITS}
+    code, *rest = status
+    rows |= zip(("step", "particle", "snapshots", "code"), (*rest, code), strict=True)
+    with _opened(Path(path)) as file:
+        kinds = {name: file[name].dtype for name in rows}
+        places = {name: file[name].id.get_offset() for name in rows}
+    try:  # without HDF5, which does not survive a disk that fails
+        with open(path, "r+b", buffering=0) as file:
+            for name, value in rows.items():
+                data = memoryview(np.ascontiguousarray(value, kinds[name]).reshape(-1)).cast("B")
+                file.seek(places[name] + number * len(data))
+                while data:
+                    data = data[file.write(data) :]
+    except OSError as error:
+        raise SweepFileError(str(unwritable(Path(path), error))) from None
 
 
 def read_status(path: str | os.PathLike) -> Status:
@@ -152,9 +153,36 @@ def read_member(path: str | os.PathLike, number: int) -> Trajectory:
 
 def _identity(scenes: Sequence[Scene]) -> str:
     """What tells a sweep from others."""
-    return json.dumps(
-        {"scene": scenes[0].name, "parameters": [dict(scene.parameters) for scene in scenes]}
-    )
+    parameters = plain([scene.parameters for scene in scenes], "parameters")
+    return json.dumps({"scene": scenes[0].name, "parameters": parameters})
+
+
+def _contents(scenes: Sequence[Scene]) -> list[dict[str, str]]:
+    """What the first scene holds, and what each other one holds otherwise."""
+    first, *others = map(content, scenes)
+    return [first, *({k: v for k, v in c.items() if first.get(k) != v} for c in others)]
+
+
+def _check(path: Path, identity: str, contents: Sequence[dict[str, str]]) -> None:
+    """A SweepFileError that says in what the sweep in a file is another one."""
+    with _opened(path) as file:
+        kept = [json.loads(text) for text in file["content"].asstr()] if "content" in file else []
+        other = ""
+        if not kept or len(kept) != len(contents):
+            other = f"{len(file['code'])} members"
+            other += "" if kept else ", and what they were is not in it"
+        elif file.attrs["identity"] != identity or kept != contents:
+            pairs = zip(kept, contents, strict=True)
+            told = (
+                (k, differences({**kept[0], **a}, {**contents[0], **b}))
+                for k, (a, b) in enumerate(pairs)
+            )
+            other = next((f"member {k}: {text}" for k, text in told if text), "other parameters")
+    if other:
+        raise SweepFileError(
+            f"{path}: holds another sweep ({other}); name another file, or repeat the scenes it "
+            "was made with to go on with it."
+        )
 
 
 def _opened(path: Path) -> h5py.File:

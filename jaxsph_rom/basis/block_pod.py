@@ -10,7 +10,7 @@ from jaxsph import Fluid
 
 from .centring import Centring
 from .inner_product import InnerProduct
-from .pod import Basis, weighted_fluctuations
+from .pod import Basis, check_snapshots, numerical_rank, weighted_fluctuations, weighted_norm
 
 _BLOCKS = {"density": slice(0, 1), "velocity": slice(1, None)}
 
@@ -49,10 +49,15 @@ def block_pod(
         ValueError: if there are fewer snapshots than modes, a value is not finite, or a field
             is its centre at all times.
     """
-    points, fields, times = snapshots.shape
+    points, fields, times = check_snapshots(snapshots)
     scaled, centre, weights = weighted_fluctuations(snapshots, product, fluid, centring)
     (left_rho, rho), (left_u, u) = (
-        _decomposed(name, scaled[:, block].reshape(-1, times)) for name, block in _BLOCKS.items()
+        _decomposed(
+            name,
+            scaled[:, block].reshape(-1, times),
+            weighted_norm(centre[:, block], weights[block], points),
+        )
+        for name, block in _BLOCKS.items()
     )
     of_rho, of_u = _counts(modes, rho, u, times)
     phi = np.zeros((points, fields, of_rho + of_u), scaled.dtype)
@@ -66,15 +71,16 @@ def block_pod(
     return Basis(modes=phi[:, :, order], centre=centre, weights=weights, singular_values=sigma)
 
 
-def _decomposed(name: str, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left singular vectors, and singular values over the norm of the block."""
+def _decomposed(name: str, matrix: np.ndarray, centre: float) -> tuple[np.ndarray, np.ndarray]:
+    """Left singular vectors, and singular values over the norm of the block, without round-off."""
     norm = np.linalg.norm(matrix)
-    if norm == 0.0:
+    left, sigma, _ = scipy.linalg.svd(matrix, full_matrices=False, overwrite_a=True)
+    rank = numerical_rank(sigma, matrix.shape[1], centre)
+    if rank == 0:
         raise ValueError(
             f"snapshots: {name} is the centre at all times, which has no modes; use `pod`."
         )
-    left, sigma, _ = scipy.linalg.svd(matrix, full_matrices=False, overwrite_a=True)
-    return left, sigma / norm
+    return left[:, :rank], sigma[:rank] / norm
 
 
 def _counts(

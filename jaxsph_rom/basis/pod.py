@@ -88,11 +88,12 @@ def pod(
         snapshots: (G, F, S), density first.
         product: `Euclidean()` is the paper's.
         fluid: gives the product its scales.
-        modes: how many to keep; all if none is given.
+        modes: how many to keep; as many as the numerical rank if none is given.
         centring: the product's own if none is given.
 
     Raises:
-        ValueError: if there are fewer snapshots than modes, or a value is not finite.
+        ValueError: if the snapshots are none, in another order, all the centre, of a lower rank
+            than modes are asked for, or not finite.
 
     Examples:
         >>> import numpy as np
@@ -108,21 +109,73 @@ def pod(
         >>> bool(basis.singular_values[2] < 1e-6 * basis.singular_values[0])
         True
     """
-    points, fields, times = snapshots.shape
-    count = min(points * fields, times)
-    if count == 0:
-        raise ValueError(f"snapshots: there is none in {snapshots.shape}; record some.")
-    if modes is not None and not 1 <= modes <= count:
-        raise ValueError(
-            f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; "
-            "ask for fewer modes or record more snapshots."
-        )
+    points, fields, times = check_snapshots(snapshots)
     scaled, centre, weights = weighted_fluctuations(snapshots, product, fluid, centring)
     matrix = scaled.reshape(points * fields, times)
     left, sigma, _ = scipy.linalg.svd(matrix, full_matrices=False, overwrite_a=True)
-    left = left[:, : (modes or count)].reshape(points, fields, -1)
+    rank = numerical_rank(sigma, times, weighted_norm(centre, weights, points))
+    count = check_modes(modes, rank, times)
+    left = left[:, :count].reshape(points, fields, -1)
     left /= np.sqrt(weights)[None, :, None]
     return Basis(modes=left, centre=centre, weights=weights, singular_values=sigma)
+
+
+def check_snapshots(snapshots: Float[np.ndarray, "points fields times"]) -> tuple[int, int, int]:
+    """The numbers of points, fields and times.
+
+    Raises:
+        ValueError: for another order of axes, or none of one.
+    """
+    check_order(snapshots)
+    if 0 in snapshots.shape:
+        raise ValueError(f"snapshots: there is none in {snapshots.shape}; record some.")
+    return snapshots.shape
+
+
+def check_order(snapshots: np.ndarray) -> None:
+    """Raise a ValueError unless the axes can be points, fields and times."""
+    if snapshots.ndim != 3 or snapshots.shape[1] not in (3, 4):
+        raise ValueError(
+            f"snapshots: their shape is {snapshots.shape}; give (points, fields, times), the "
+            "fields being density and the components of velocity (np.moveaxis(a, 0, -1) where "
+            "times are first)."
+        )
+
+
+def numerical_rank(sigma: Float[np.ndarray, " k"], columns: int, centre: float) -> int:
+    """How many singular values are more than round-off: that of the decomposition,
+
+        sigma > columns eps sigma_1   (as numpy's matrix_rank),
+
+    and that of the fields from which a centre was subtracted, sigma > 4 eps |centre|, its weighted
+    norm over all points.
+    """
+    noise = np.finfo(sigma.dtype).eps * np.maximum(columns * sigma[:1], 4.0 * centre)
+    return int(np.count_nonzero(sigma > noise))
+
+
+def weighted_norm(centre: Float[np.ndarray, "#points fields"], weights, points: int) -> float:
+    """sqrt(sum w_f c_f^2) over all points."""
+    repeated = points / len(centre)
+    return float(np.sqrt(repeated * np.sum(centre**2 * np.asarray(weights)[None, :])))
+
+
+def check_modes(modes: int | None, rank: int, times: int) -> int:
+    """The number of modes to keep, all if none is given.
+
+    Raises:
+        ValueError: if there are not so many, or none at all.
+    """
+    if rank == 0:
+        raise ValueError(
+            f"snapshots: all {times} are the centre, which has no modes; record a longer run."
+        )
+    if modes is not None and not 1 <= modes <= rank:
+        raise ValueError(
+            f"modes: {modes} asked for, but {times} snapshots give 1 to {rank}; "
+            "ask for fewer modes or record more snapshots."
+        )
+    return rank if modes is None else modes
 
 
 def weighted_fluctuations(

@@ -12,7 +12,7 @@ from jaxsph import Fluid
 
 from .centring import Centring
 from .inner_product import InnerProduct
-from .pod import Basis
+from .pod import Basis, check_modes, check_order, numerical_rank, weighted_norm
 
 
 def streaming_pod(
@@ -86,21 +86,11 @@ def streaming_pod(
         scaled = (block - centre[:, :, None]) * scale
         columns[:, kept:] = scaled.reshape(len(left), -1)
         del block, scaled, left  # before LAPACK works and the next block is made
-        left, sigma = _left_factors(columns, rank)
+        left, sigma = _left_factors(columns, rank, weighted_norm(centre, weights, shape[0]))
         del columns
     if times == 0:
         raise ValueError("snapshots: there is none in the blocks; record some or check the file.")
-    count = len(sigma)
-    if count == 0:
-        raise ValueError(
-            f"snapshots: all {times} are the centre, which has no modes; record a longer run."
-        )
-    if modes is not None and modes > count:
-        raise ValueError(
-            f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; "
-            "ask for fewer modes or record more snapshots."
-        )
-    left = left[:, : (modes or count)].reshape(*shape, -1)
+    left = left[:, : check_modes(modes, len(sigma), times)].reshape(*shape, -1)
     return Basis(modes=left / scale, centre=centre, weights=weights, singular_values=sigma)
 
 
@@ -124,13 +114,12 @@ def _centre_of_all(
 
 
 def _left_factors(
-    columns: Float[np.ndarray, "rows columns"], rank: int | None
+    columns: Float[np.ndarray, "rows columns"], rank: int | None, centre: float
 ) -> tuple[Float[np.ndarray, "rows kept"], Float[np.ndarray, " kept"]]:
     """U and Sigma of columns, up to the numerical rank and the rank wanted; columns are lost."""
     factor, core = scipy.linalg.qr(columns, mode="economic", overwrite_a=True)
     left, sigma, _ = scipy.linalg.svd(core, full_matrices=False)
-    noise = core.shape[1] * np.finfo(sigma.dtype).eps * sigma[:1]  # as numpy's matrix_rank
-    kept = np.count_nonzero(sigma > noise)
+    kept = numerical_rank(sigma, core.shape[1], centre)
     kept = kept if rank is None else min(kept, rank)
     return factor @ left[:, :kept], sigma[:kept]
 
@@ -153,6 +142,7 @@ def _check_shape(block: np.ndarray, shape: tuple[int, ...] | None) -> None:
             f"blocks: each is (points, fields, times), got one of shape {block.shape}; "
             "put a whole matrix into a list."
         )
+    check_order(block)
     if shape is not None and block.shape[:2] != shape:
         raise ValueError(
             f"blocks: one has (points, fields) = {block.shape[:2]}, the first one {shape}; "

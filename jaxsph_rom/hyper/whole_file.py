@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from jaxsph.environment import versions
-from jaxsph.io import check_target
+from jaxsph.io import whole_file
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -43,22 +43,14 @@ def write_whole(
     Raises:
         TrajectoryFileError: if the file cannot be written.
     """
-    path = Path(path)
-    check_target(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     own = {"format": kind[0], "schema_version": kind[1], "units": "SI"}
     own["versions"] = json.dumps(versions())
-    try:
-        with h5py.File(unfinished, "w") as file:
-            for name, (axes, unit) in layout.items():
-                dataset = file.create_dataset(name, data=np.asarray(arrays[name]))
-                dataset.attrs["axes"], dataset.attrs["unit"] = axes, unit
-            for name, value in {**own, **attributes}.items():
-                file.attrs[name] = value
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with whole_file(path) as file:
+        for name, (axes, unit) in layout.items():
+            dataset = file.create_dataset(name, data=np.asarray(arrays[name]))
+            dataset.attrs["axes"], dataset.attrs["unit"] = axes, unit
+        for name, value in {**own, **attributes}.items():
+            file.attrs[name] = value
 
 
 def read_whole(

@@ -5,7 +5,6 @@ from .plans import PLANS as PLANS
 from .plans import Plan as Plan
 from .quiet_start import quiet as quiet
 from .recorded_run import full_run as full_run
-from .recorded_run import recorded_run as recorded_run
 from .recorded_run import with_record as with_record
 from .settled import settled as settled
 from .study import Experiment as Experiment

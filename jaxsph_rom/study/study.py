@@ -14,8 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
+from jaxsph.content import digest
 from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.io import read_trajectory
+from jaxsph.kept_run import kept_run
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
 
@@ -27,7 +29,7 @@ from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projecti
 from ..reference import ReferenceSpace, lagrangian_snapshots
 from ..report import Case
 from ..splines import LocalSplines
-from .recorded_run import Progress, full_run, recorded_run, with_record
+from .recorded_run import Progress, full_run, with_record
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,23 @@ class Experiment:
 
 
 @dataclass(frozen=True)
+class ModelBasis:
+    """What a reduced model is made of, for the report.
+
+    Args:
+        model: what kind it is.
+        trained_on: Reynolds numbers of its training runs.
+        basis: of the model.
+        reference: the points of its modes, and the map to them.
+    """
+
+    model: str
+    trained_on: tuple[float, ...]
+    basis: Basis
+    reference: ReferenceSpace
+
+
+@dataclass(frozen=True)
 class Outcome:
     """A reduced run beside its full one.
 
@@ -51,6 +70,7 @@ class Outcome:
         time, velocity_percent, pressure_percent: discrepancy on the probes over time (S,).
         trajectory: of the reduced model, as far as it came.
         profile: velocity norm and pressure on the probes over time, each (S, P).
+        made_of: the model's basis; None if it is that of the study.
     """
 
     case: Case
@@ -59,6 +79,7 @@ class Outcome:
     pressure_percent: np.ndarray
     trajectory: Trajectory
     profile: tuple[np.ndarray, np.ndarray]
+    made_of: ModelBasis | None = None
 
 
 class Study:
@@ -201,6 +222,8 @@ class Study:
             parts.append(self.rule.__name__.removesuffix("Map").lower())
         if self.interpolation is not LocalSplines:
             parts.append(self.interpolation.__name__.lower())
+        if self.spline_order != 3:
+            parts.append(f"order-{self.spline_order}")
         return "-".join(parts)
 
     def _reduced(self, experiment, reynolds, basis, interpolation, projection) -> Outcome:
@@ -235,9 +258,10 @@ class Study:
 
         path = self.folder / "reduced" / f"{self._options}-{trained}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
+        label = f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}"
         fault = None
         try:
-            run = recorded_run(
+            run = kept_run(
                 path,
                 recorded,
                 lambda: ReducedModel.of_scene(
@@ -245,8 +269,16 @@ class Study:
                 ),
                 lambda model: eqx.filter_jit(model.project)(scene.state),
                 restore,
-                f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}",
-                self.progress,
+                lambda done: self.progress(label, scene.steps, done),
+                {
+                    "training": [digest(self.scene(number)) for number in experiment.trained_on],
+                    "product": self.product,
+                    "centring": self.centring,
+                    "advection": self.advection,
+                    "projection": projection,
+                    "map": self.rule,
+                    "interpolation": self.interpolation,
+                },
             )
         except SimulationError as error:
             fault, run = error, read_trajectory(path)
@@ -281,6 +313,7 @@ class Study:
         profile: tuple[np.ndarray, np.ndarray],
         fault: SimulationError | None,
         rest: dict[str, Any],
+        made_of: ModelBasis | None = None,
     ) -> Outcome:
         """A reduced run beside its full one.
 
@@ -290,6 +323,7 @@ class Study:
             profile: its velocity norm and pressure on the probes (S, P).
             fault: that ended it, if any.
             rest: values of the `Case` that only its maker knows.
+            made_of: the model's basis; that of the study if none is given.
         """
         scene, full = self.scene(reynolds), self.full(reynolds)
         truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
@@ -313,7 +347,7 @@ class Study:
             fault_time=None if fault is None else fault.step * scene.time_step,
             **rest,
         )
-        return Outcome(case, run.time, percent[0], percent[1], run, profile)
+        return Outcome(case, run.time, percent[0], percent[1], run, profile, made_of)
 
 
 def _centre_line(scene: Scene) -> np.ndarray:

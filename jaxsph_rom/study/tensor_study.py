@@ -22,7 +22,7 @@ from ..hyper import (
 )
 from ..hyper.fixed_points import check_steady
 from ..hyper.training import held_back, viscosity_of
-from .study import Experiment, Outcome, Study
+from .study import Experiment, ModelBasis, Outcome, Study
 
 
 class TensorStudy:
@@ -112,8 +112,9 @@ class TensorStudy:
             "rom_seconds": found.run_seconds if fault is None else None,
             "rom_compile_seconds": found.compile_seconds,
         }
+        made_of = ModelBasis(rest["hyper"], rest["trained_on"], flow.basis, flow.reference)
         profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
-        return study.judged(reynolds, flow.fields(coordinates, time), profile, fault, rest)
+        return study.judged(reynolds, flow.fields(coordinates, time), profile, fault, rest, made_of)
 
 
 def _label(training: dict[str, Any]) -> str:

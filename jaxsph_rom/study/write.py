@@ -24,7 +24,7 @@ from ..report import (
     write_html_report,
     write_report,
 )
-from .study import Experiment, Outcome, Study
+from .study import Experiment, ModelBasis, Outcome, Study
 
 _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
@@ -58,22 +58,24 @@ def write_study(
     folder.mkdir(parents=True, exist_ok=True)
     bases: list[dict[str, Any]] = []
     basis_figures: list[Shown] = []
-    for number, experiment in enumerate(experiments):
-        suffix = f"_{number + 1}" if len(experiments) > 1 else ""
-        basis_figures += _basis_figures(study, experiment, folder, suffix)
-        bases.append(_basis_energies(study, experiment))
+    made_of = [(e, basis) for e in experiments for basis in _made_of(study, e, outcomes)]
+    for number, (experiment, model) in enumerate(made_of):
+        suffix = f"_{number + 1}" if len(made_of) > 1 else ""
+        basis_figures += _basis_figures(study, experiment, model, folder, suffix)
+        bases.append(_basis_energies(study, experiment, model))
     first = study.scene(experiments[0].trained_on[0])
     if profile_time is None:
         profile_time = 0.5 * first.end_time
     extra = {
         "bases": bases,
         "parameters": first.parameters,
-        "advection": study.advection.name,
-        "map": study.rule.__name__,
-        "interpolation": study.interpolation.__name__,
-        "spline_order": study.spline_order,
+        "map": ", ".join(dict.fromkeys(basis["map"] for basis in bases)),
         "judged_from": study.judged_from,
     }
+    if any(outcome.made_of is None for outcome in outcomes):  # of models on moving particles
+        extra["advection"] = study.advection.name
+        extra["interpolation"] = study.interpolation.__name__
+        extra["spline_order"] = study.spline_order
     history = discrepancy_history(
         [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
         folder / "discrepancy.png",
@@ -87,22 +89,43 @@ def write_study(
         shown += _fields(study, outcomes, folder, profile_time)
     cases, made_on = [outcome.case for outcome in outcomes], environment()
     write_report(json_path or folder / "report.json", cases, made_on, extra)
-    settings = {**first.parameters, **{name: extra[name] for name in _SETTINGS}}
+    settings = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
     settings.pop("reynolds", None)  # each case has its own
     write_html_report(folder / "report.html", cases, shown + basis_figures, settings, made_on)
     return extra
 
 
-def _basis_figures(study: Study, experiment: Experiment, folder: Path, suffix: str) -> list[Shown]:
-    """Singular values and modes of an experiment's basis."""
-    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
-    trained = f"trained on Re {', '.join(f'{number:g}' for number in experiment.trained_on)}"
+def _made_of(
+    study: Study, experiment: Experiment, outcomes: Sequence[Outcome]
+) -> list[ModelBasis]:
+    """The bases of an experiment's models: of each kind that with the most modes."""
+    found: dict[str, ModelBasis] = {}
+    for outcome in outcomes:
+        if tuple(outcome.case.trained_on) != tuple(experiment.trained_on):
+            continue
+        model = outcome.made_of
+        if model is None:
+            if "" not in found:
+                basis, reference = study.basis(experiment), study.reference(experiment)
+                found[""] = ModelBasis("", outcome.case.trained_on, basis, reference)
+        elif model.model not in found or found[model.model].basis.size < model.basis.size:
+            found[model.model] = model
+    return list(found.values())
+
+
+def _basis_figures(
+    study: Study, experiment: Experiment, model: ModelBasis, folder: Path, suffix: str
+) -> list[Shown]:
+    """Singular values and modes of a model's basis."""
+    basis, lagrangian = model.basis, study.lagrangian_basis(experiment)
+    trained = f"of {model.model}, " if model.model else ""
+    trained += f"trained on Re {', '.join(f'{number:g}' for number in experiment.trained_on)}"
     decay = singular_values(
         lagrangian.singular_values, basis.singular_values, folder / f"singular_values{suffix}.png"
     )
     figures = [(decay, f"Singular values and cumulative energy of the basis {trained}.")]
     numbers = tuple(n for n in _SHOWN_MODES if n <= basis.size)
-    points = np.asarray(study.reference(experiment).points)
+    points = np.asarray(model.reference.points)
     start = study.full(experiment.trained_on[0]).position[0]
     if points.shape[1] == 2:
         shown = slice(max(numbers))
@@ -118,13 +141,15 @@ def _basis_figures(study: Study, experiment: Experiment, folder: Path, suffix: s
     return figures
 
 
-def _basis_energies(study: Study, experiment: Experiment) -> dict[str, Any]:
-    """The cumulative energies of an experiment's basis [%]."""
-    basis, lagrangian = study.basis(experiment), study.lagrangian_basis(experiment)
+def _basis_energies(study: Study, experiment: Experiment, model: ModelBasis) -> dict[str, Any]:
+    """The cumulative energies of a model's basis [%]."""
+    lagrangian = study.lagrangian_basis(experiment)
     return {
         "trained_on": list(experiment.trained_on),
+        "model": model.model or "moving particles",
+        "map": type(model.reference.map).__name__,
         "cumulative_energy_percent": {
-            "reference": _listed(basis.singular_values),
+            "reference": _listed(model.basis.singular_values),
             "lagrangian": _listed(lagrangian.singular_values),
         },
     }

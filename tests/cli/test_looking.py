@@ -9,12 +9,15 @@ import pytest
 from PIL import Image
 
 import jaxsph
+from jaxsph.arrangements import Lattice
 from jaxsph.cli import main
 from jaxsph.cli.animate import FIELDS
 from jaxsph.cli.show import _size
 from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.plotting import FIELDS as DRAWN
+from jaxsph.sweeps import sweep_file
 from jaxsph.trajectory import Snapshot
+from jaxsph_rom.hyper.whole_file import write_whole
 from tests.runs import random_run
 
 
@@ -84,6 +87,29 @@ def test_show_compiles_nothing():
         [sys.executable, "-c", script], env={"PYTHONPATH": root}, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_show_of_other_files(capsys):
+    scenes = [jaxsph.scenes.taylor_green(12, re, end_time=0.04, arrangement=Lattice())
+              for re in (100.0, 200.0)]  # fmt: skip
+    sweep_file.create("sweep.h5", scenes)
+    assert main(["show", "sweep.h5", "--json", "new/sweep.json"]) == 0
+    rows = shown(capsys)
+    assert rows["holds"] == "jaxsph sweep, schema 1" and rows["scene"] == "taylor-green"
+    assert rows["members"] == "2, 0 lost, 2 not run yet"
+    assert rows["velocity"] == "2 x 3 x 144 x 2, float64 [m/s]"
+    with open("new/sweep.json") as file:
+        assert json.load(file)["members"] == rows["members"]
+    layout, arrays = {"starts": ("runs modes", "coordinate")}, {"starts": np.ones((2, 3))}
+    write_whole("m.h5", ("jaxsph reduced flow", 1), layout, arrays, {"scene": "couette"})
+    assert main(["show", "m.h5"]) == 0
+    rows = shown(capsys)
+    assert rows["starts"] == "2 x 3, float64 [coordinate]" and rows["scene"] == "couette"
+    assert main(["show", "m.h5", "--figure", "f.png"]) == 2
+    random_run("t.h5")
+    assert main(["export", "t.h5"]) == 0
+    assert main(["show", "t.vtkhdf"]) == 0
+    assert shown(capsys)["VTKHDF/Points"] == "1280 x 3, float64 [m]"
 
 
 def test_sizes():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxsph import Fluid
-from jaxsph_rom import Energy, Euclidean, cumulative_energy, pod
+from jaxsph_rom import Energy, Euclidean, block_pod, cumulative_energy, pod, streaming_pod
 
 FLUID = Fluid(1000.0, 10.0, 1.0)
 
@@ -54,6 +54,31 @@ def test_more_modes_than_snapshots_are_refused():
         pod(snapshots(), Euclidean(), FLUID, 13)
     with pytest.raises(ValueError, match="modes"):
         pod(snapshots(), Euclidean(), FLUID, 4).truncated(5)
+
+
+def test_modes_of_noise_are_refused():
+    """Beyond the rank of the snapshots there is only round-off."""
+    data = snapshots(rank=3)
+    assert pod(data, Energy(), FLUID).size == 3
+    assert len(pod(data, Energy(), FLUID, 3).singular_values) == 12
+    for decompose in (pod, block_pod, lambda data, *rest: streaming_pod([data], *rest)):
+        with pytest.raises(ValueError, match="modes: 10 .*asked for, but 12 snapshots give 1 to"):
+            decompose(data, Energy(), FLUID, 10)
+    fluid = Fluid(*(np.float32(x) for x in (1000.0, 10.0, 1.0)))
+    assert pod(data.astype("float32"), Energy(), fluid).size == 3
+    rest = np.zeros((40, 3, 12))
+    rest[:, 0] = 1000.0
+    for decompose in (pod, lambda data, *rest: streaming_pod([data], *rest)):
+        with pytest.raises(ValueError, match="all 12 are the centre, which has no modes"):
+            decompose(rest, Energy(), FLUID, 10)
+    assert pod(rest, Euclidean(), FLUID).size == 1
+
+
+@pytest.mark.parametrize("order", [(2, 0, 1), (1, 0, 2), (0, 2, 1)])
+def test_another_order_of_axes_is_refused(order):
+    for decompose in (pod, block_pod, lambda data, *rest: streaming_pod([data], *rest)):
+        with pytest.raises(ValueError, match=r"shape .*give \(points, fields, times\)"):
+            decompose(snapshots().transpose(order), Energy(), FLUID, 2)
 
 
 def test_snapshots_that_are_not_finite_are_refused():

@@ -17,6 +17,7 @@ from jaxsph import run_scene
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.cli import main
 from jaxsph.integrate import FaultCode
+from jaxsph.io import Lock, TrajectoryFileError
 from jaxsph.scenes import lid_driven_cavity, taylor_green
 from jaxsph.sweeps import SweepFileError, read_member, read_status, sweep, sweep_file
 
@@ -165,6 +166,22 @@ def test_what_is_no_sweep_is_refused(tmp_path):
     path.write_text("nothing")
     with pytest.raises(SweepFileError, match="cannot be read"):
         read_status(path)
+
+
+def test_another_sweep_of_the_same_parameters_is_refused(tmp_path):
+    """Parameters are a record; what the scenes hold is compared."""
+    path = tmp_path / "sweep.h5"
+    scenes = members(3)
+    sweep_file.create(path, scenes)
+    sweep_file.create(path, members(3))
+    other = eqx.tree_at(lambda s: s.state.velocity, scenes[1], 0.5 * scenes[1].state.velocity)
+    with pytest.raises(SweepFileError, match="member 1: state.velocity has other values"):
+        sweep([scenes[0], other, scenes[2]], path)
+    slower = [eqx.tree_at(lambda s: s.effects[2].viscosity, scene, 0.5) for scene in scenes]
+    with pytest.raises(SweepFileError, match=r"member 0: effects\[2\].viscosity is 0.01"):
+        sweep(slower, path)
+    with Lock(path), pytest.raises(TrajectoryFileError, match="is being written by this process"):
+        sweep(scenes, path)
 
 
 def test_the_command(tmp_path, capsys):

@@ -1,0 +1,107 @@
+"""Runs kept in files: done once, and taken up again where they were cut short."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from .content import content
+from .integrate import Model
+from .io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
+from .simulate import simulate
+from .trajectory import Trajectory
+
+
+def kept_run(
+    path: str | os.PathLike,
+    scene: Any,
+    model: Callable[[], Model],
+    start: Callable[[Model], Any],
+    restore: Callable[[Trajectory], Any],
+    progress: Callable[[int], AbstractContextManager[Callable[[int], None] | None]],
+    made_by: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Trajectory:
+    """The trajectory in the file at `path`, run as far as it is not there yet.
+
+    Args:
+        path: of the trajectory file.
+        scene: its steps, and its parameters as they are recorded.
+        model: makes the model, if there is anything left to run.
+        start: makes the initial state from the model.
+        restore: makes the state from the last snapshot of a trajectory.
+        progress: opens, from the steps done before, what is told of steps as they are done.
+        made_by: what else makes the run, beside the scene.
+        options: of `simulate`.
+
+    Raises:
+        TrajectoryFileError: if the file holds another run, or another process writes it; it stays
+            as it is.
+        SimulationError: on a fault; the file then holds the good snapshots.
+    """
+    path = Path(path)
+    wanted = {**(content({"made_by": made_by}) if made_by else {}), **content(scene)}
+    done = steps_done(path, wanted)
+    if done == scene.steps:
+        return _whole(path, scene)
+    made = model()
+    if done:
+        begun, writer = read_trajectory(path), TrajectoryWriter.append_to(path)
+        if writer.last_step != begun.metadata["steps"]:
+            writer.close()
+            raise _disturbed(path)
+        state = restore(begun)
+    else:
+        state = start(made)
+        coordinates = jax.eval_shape(made.observe, state).coordinates
+        modes = None if coordinates is None else coordinates.shape[0]
+        writer = TrajectoryWriter.create(
+            path, scene, modes=modes, made_by=wanted, overwrite=done is not None
+        )
+    with writer, progress(done or 0) as report:
+        part = simulate(
+            made,
+            state,
+            time_step=scene.time_step,
+            steps=scene.steps,
+            steps_per_snapshot=scene.steps_per_snapshot,
+            first_step=done or 0,
+            recorder=writer,
+            progress=report,
+            metadata={"scene": scene.name, "parameters": scene.parameters},
+            **options,
+        )
+        writer.finish(part.metadata)
+    return _whole(path, scene)
+
+
+def steps_done(path: Path, wanted: Mapping[str, str]) -> int | None:
+    """Steps that a file holds of the run of that content; None if there is no file.
+
+    Raises:
+        TrajectoryFileError: naming what differs, if the file holds another run.
+    """
+    if not path.exists():
+        return None
+    found = read_checkpoint(path)
+    found.check(path, wanted)
+    return max(found.step, 0)
+
+
+def _whole(path: Path, scene: Any) -> Trajectory:
+    """The trajectory in a file, which must be all of the scene's run."""
+    trajectory = read_trajectory(path)
+    if len(trajectory.time) != scene.steps // scene.steps_per_snapshot + 1:
+        raise _disturbed(path)
+    return trajectory
+
+
+def _disturbed(path: Path) -> TrajectoryFileError:
+    return TrajectoryFileError(
+        f"{path}: was written by another process in between; repeat the call once that has ended."
+    )

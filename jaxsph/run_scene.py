@@ -1,0 +1,56 @@
+"""A scene's full model, run by the scene's own steps."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+
+from .kept_run import kept_run
+from .simulate import simulate
+from .trajectory import Trajectory
+
+
+def run_scene(scene, path: str | os.PathLike | None = None, **options) -> Trajectory:
+    """`simulate` the full model of a scene by the scene's own steps.
+
+    Args:
+        scene: to run.
+        path: of a trajectory file that keeps the run, if any: it is made, gone on with where it was
+            cut short, or read where it is whole. The scene may be any, edited ones too.
+        options: of `simulate`: `progress`, `stepping`, and, without a path, `recorder`.
+
+    Raises:
+        TrajectoryFileError: if the file holds another run, naming what differs; it stays as it is.
+        SimulationError: as `simulate`.
+
+    Examples:
+        >>> import jaxsph
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph.metrics import kinetic_energy
+        >>> scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        >>> trajectory = jaxsph.run_scene(scene)
+        >>> energy = kinetic_energy(trajectory.velocity, float(scene.mass))
+        >>> bool(energy[-1] < energy[0])  # viscosity takes it
+        True
+    """
+    if path is not None:
+        progress = options.pop("progress", None)
+        return kept_run(
+            path,
+            scene,
+            scene.model,
+            lambda _: scene.state,
+            lambda trajectory: trajectory.state(-1),
+            lambda _: nullcontext(progress),
+            made_by={"stepping": options["stepping"]} if "stepping" in options else None,
+            **options,
+        )
+    return simulate(
+        scene.model(),
+        scene.state,
+        time_step=scene.time_step,
+        steps=scene.steps,
+        steps_per_snapshot=scene.steps_per_snapshot,
+        metadata={"scene": scene.name, "parameters": scene.parameters},
+        **options,
+    )
