@@ -40,7 +40,7 @@ SMALL = {
     "poiseuille": 25,
     "dam-break": 50,
     "open-cavity": None,
-    "piston-wave-maker": 60,
+    "piston-wave-maker": 72,
 }
 EFFECTS = {
     name
