@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..domain import Box
 from ..walls import Region
 
-_COARSER, _FINER = 0.2, 0.05  # by which a resolution may change; steps are those of the one wanted
+_COARSER, _FINER = 0.1, 0.05  # by which a resolution may change; steps are those of the one wanted
 _ROUND_OFF = 1e-6  # of a spacing
 
 
@@ -19,7 +19,7 @@ def fitted_resolution(box: Box, region: Region, side: float, resolution: int) ->
         box: of the lattice.
         region: of fluid at the start.
         side: the length [m] that the resolution divides.
-        resolution: wanted; it stays where none fits that is a fifth coarser at most, or a twentieth
+        resolution: wanted; it stays where none fits that is a tenth coarser at most, or a twentieth
             finer.
     """
     least, most = int((1.0 - _COARSER) * resolution), int((1.0 + _FINER) * resolution)

@@ -68,7 +68,7 @@ def test_the_wave_is_as_high_as_linear_theory_says():
         ({"stroke": 0.2}, "stroke: at most 0.1 m"),
         ({"stroke": 0.0}, "stroke: must be positive"),
         ({"period": -1.0}, "period: must be positive"),
-        ({"resolution": 30}, "resolution: a kernel's support of 0.6 m reaches through the 0.3 m"),
+        ({"resolution": 30}, "resolution: a kernel's support of 0.48 m reaches through the 0.3 m"),
     ],
 )
 def test_settings_out_of_range_are_named(options, message):
