@@ -13,6 +13,7 @@ from jaxsph import run_scene
 from jaxsph.effects import (
     AdjointContinuity,
     FreeSlip,
+    FreeSurface,
     KernelCorrection,
     PairRepulsion,
     PressureForce,
@@ -27,7 +28,7 @@ from jaxsph.vector import Vector
 from .test_energy import CORNERED, energy_rate
 from .vessels import disturbed, rates_of, vessel
 
-WALLS = (AdjointContinuity(), PressureForce(), WallPressure(), FreeSlip())
+WALLS = (FreeSurface(), AdjointContinuity(), PressureForce(), WallPressure(), FreeSlip())
 
 
 def of(effects, **options):
@@ -59,9 +60,8 @@ def test_a_ghost_gathers_the_velocity_relative_to_its_wall():
 
 
 def test_velocity_diffusion_leaves_linear_fields_alone():
-    effects = (KernelCorrection(), VelocityDiffusion(0.1))
-    scene = half_full(of((*effects, FreeSlip()), side=12, region=None))
-    scene = dataclasses.replace(scene, walls=None, effects=effects)
+    effects = (KernelCorrection(), FreeSurface(), VelocityDiffusion(0.1))
+    scene = half_full(dataclasses.replace(vessel(12), walls=None, effects=effects))
     slope = jnp.asarray([[0.3, -1.2], [0.7, 0.4]])
     state = dataclasses.replace(scene.state, velocity=scene.state.position @ slope.T + 2.0)
     assert jnp.abs(rates_of(scene)(state).velocity).max() < 1e-12  # of 10 / s times some m/s
