@@ -85,6 +85,14 @@ class Effect(eqx.Module):
         """The effect's name in reports and compiled programs."""
         return type(self).__name__
 
+    def on_fixed_points(self) -> tuple[Effect, ...]:
+        """What the effect is at points that do not move: itself, unless it says otherwise.
+
+        Raises:
+            ValueError: if it has no meaning there.
+        """
+        return (self,)
+
     def step_limit(self, fluid: Fluid, space: Space) -> Float[Array, ""] | float:
         """The longest stable step [s] as far as this effect goes."""
         return math.inf

@@ -28,6 +28,9 @@ class WallRepulsion(Effect):
 
     fluid_region: Region = eqx.field(static=True)
 
+    def on_fixed_points(self):
+        return ()  # no point comes near a wall
+
     def rates(self, context, fields, sums):
         distance, spacing = self._distance(context.bodies), context.space.spacing
         position, reach = fields["position"], _RANGE * spacing
