@@ -31,13 +31,13 @@ class EulerianRates(eqx.Module):
     Args:
         functional: effects that act on fixed points, and `FieldAdvection`.
         points: x_G (G, n) [m].
-        neighbors: list of the points.
+        neighbors: list of the points; none where rates are only taken `around` some of them.
         coefficients: what of the functional is left open: theta (K,).
     """
 
     functional: SPHFunctional
     points: Float[Array, "points dim"]
-    neighbors: VerletList | WallList
+    neighbors: VerletList | WallList | None
     coefficients: Coefficients
 
     @classmethod
@@ -69,10 +69,14 @@ class EulerianRates(eqx.Module):
         functional: SPHFunctional,
         points: Float[Array, "points dim"],
         coefficients: Coefficients,
+        listed: bool = True,
     ) -> EulerianRates:
-        """Rates by a functional of fixed points (`on_points`)."""
+        """Rates by a functional of fixed points (`on_points`), with a list of these or without."""
         functional = with_effects(functional, (*functional.effects, FieldAdvection()))
-        return cls._of(functional, jnp.asarray(points, functional.mass.dtype), coefficients)
+        points = jnp.asarray(points, functional.mass.dtype)
+        if listed:
+            return cls._of(functional, points, coefficients)
+        return cls(functional, points, None, coefficients)
 
     @classmethod
     def _of(cls, functional: SPHFunctional, points, coefficients) -> EulerianRates:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .eulerian_rates import EulerianRates
 from .reduced_flow import ReducedFlow
@@ -16,6 +17,27 @@ from .reduced_flow import ReducedFlow
 _POINTS = 64  # at which the residual is taken
 _TIMES = 4
 _LEAST = 1e-12  # of a residual
+
+
+class Places(NamedTuple):
+    """Where residuals are taken.
+
+    Args:
+        rates: on these points, which come first, and on those around them.
+        members: numbers of all of these.
+        count: of the points.
+    """
+
+    rates: EulerianRates
+    members: Int[np.ndarray, " members"]
+    count: int
+
+    @classmethod
+    def among(cls, rates: EulerianRates) -> Places:
+        """Some of the points of rates, evenly spread over their numbers."""
+        points = len(rates.points)
+        samples = np.unique(np.linspace(0, points - 1, min(_POINTS, points)).astype(int))
+        return cls(*rates.around(samples), len(samples))
 
 
 class Indicator(eqx.Module):
@@ -40,14 +62,11 @@ class Indicator(eqx.Module):
     scale: Float[Array, ""]
 
     @classmethod
-    def of(cls, flow: ReducedFlow, rates: EulerianRates, scale: float) -> Indicator:
-        """The indicator of a flow, of rates on all its points."""
-        points = len(flow.reference.points)
-        samples = np.unique(np.linspace(0, points - 1, min(_POINTS, points)).astype(int))
-        around, members = rates.around(samples)
+    def of(cls, flow: ReducedFlow, places: Places, scale: float) -> Indicator:
+        """The indicator of a flow at some of its points."""
         dtype = flow.reference.points.dtype
-        functions = jnp.asarray(flow.functions[members], dtype)
-        return cls(around, functions, len(samples), jnp.asarray(scale, dtype))
+        functions = jnp.asarray(flow.functions[places.members], dtype)
+        return cls(places.rates, functions, places.count, jnp.asarray(scale, dtype))
 
     def residual(
         self,

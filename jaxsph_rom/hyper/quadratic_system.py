@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial, reduce
+from functools import reduce
 
 import equinox as eqx
 import jax
@@ -162,16 +162,38 @@ def projected(
     weights = jnp.asarray(basis.weights, dtype)
     middle = jnp.asarray(opened.middle, dtype)
     functions = jnp.concatenate([(centre - operators.rest)[:, :, None], modes], axis=2)
-    (*whole, quadratic), slopes = _around(operators, functions, centre, weights, form, middle)
+    units = np.eye(len(middle))
+    # steps that do not vanish beside the rest: what is a polynomial has no other error than that
+    steps = [max(1.0, abs(float(m))) for m in middle]
+
+    def at(*moved: tuple[int, float]):
+        values = np.asarray(middle, float)
+        for k, share in moved:
+            values = values + share * steps[k] * units[k]
+        return _assembled(
+            operators, functions, centre, weights, form, jnp.asarray(values, dtype)
+        )
+
+    *whole, quadratic = at()
+    ahead = [at((k, 1.0))[:2] for k in range(len(middle))]
     bends = {}
     for powers in (p for p in opened.powers if sum(p) == 2):
-        one, other = (middle * 0.0 + jnp.asarray(unit, dtype) for unit in _pair(powers))
-        bends[powers] = _bend(operators, functions, centre, weights, form, middle, one, other)
-    constant, linear = (
-        _about_zero(part, slope, {p: b[n] for p, b in bends.items()}, middle, opened.powers)
-        for n, (part, slope) in enumerate(zip(whole, slopes, strict=True))
-    )
-    return QuadraticSystem(constant, linear, quadratic, opened.powers)
+        k, i = (unit.index(1) for unit in _pair(powers))
+        far = at((k, 2.0)) if k == i else at((k, 1.0), (i, 1.0))
+        bends[powers] = [
+            (far[n] - ahead[k][n] - ahead[i][n] + whole[n]) / (steps[k] * steps[i])
+            for n in range(2)
+        ]
+    parts = []
+    for n in range(2):
+        slopes = [(part[n] - whole[n]) / steps[k] for k, part in enumerate(ahead)]
+        for powers, bend in bends.items():
+            if 2 in powers:
+                k = powers.index(2)
+                slopes[k] = slopes[k] - 0.5 * steps[k] * bend[n]
+        second = {powers: bend[n] for powers, bend in bends.items()}
+        parts.append(_about_zero(whole[n], slopes, second, middle, opened.powers))
+    return QuadraticSystem(*parts, quadratic, opened.powers)
 
 
 def _pair(powers: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -197,32 +219,6 @@ def _about_zero(value, slopes, bends, middle, powers):
 
 
 @eqx.filter_jit
-def _around(operators, functions, centre, weights, form, middle):
-    """Constant, linear and quadratic part at theta, and the slopes of the first two there."""
-    assembled = partial(_assembled, operators, functions, centre, weights, form)
-    found = assembled(middle)
-    if not middle.shape[0]:
-        return found, tuple(jnp.zeros((0, *part.shape), part.dtype) for part in found[:2])
-
-    def slope(direction):
-        return jax.jvp(lambda values: assembled(values)[:2], (middle,), (direction,))[1]
-
-    return found, lax.map(slope, jnp.eye(middle.shape[0], dtype=middle.dtype))
-
-
-@eqx.filter_jit
-def _bend(operators, functions, centre, weights, form, middle, one, other):
-    """Second derivatives along two directions of the constant and the linear part."""
-
-    def part(values):
-        return _assembled(operators, functions, centre, weights, form, values)[:2]
-
-    def slope(values):
-        return jax.jvp(part, (values,), (one,))[1]
-
-    return jax.jvp(slope, (middle,), (other,))[1]
-
-
 def _assembled(operators, functions, centre, weights, form, values):
     """Constant, linear and quadratic part at theta."""
     at = operators.at(values)

@@ -26,7 +26,7 @@ from .closure import ProjectedRun, fit_linear_closure
 from .eulerian_rates import EulerianRates
 from .family import Family, Training
 from .formulation import Compressible, Formulation
-from .indicator import Indicator, scale_of, velocity_error
+from .indicator import Indicator, Places, scale_of, velocity_error
 from .laws import Between, Law
 from .linear_closure import LinearClosure
 from .log_density import from_log_density
@@ -134,7 +134,7 @@ class _Project(NamedTuple):
     formulation: Formulation
     reduction: Reduction
     prepared: Any
-    rates: EulerianRates
+    places: Places
 
     @property
     def first(self) -> Scene:
@@ -179,8 +179,11 @@ def train_each(
     if runs is None:
         runs = [_run(scene, training, k, progress) for k, scene in enumerate(training.scenes)]
     before = clock.perf_counter()
-    rates = EulerianRates.of_scene(first, reference.points, training.coefficients)
-    project = _Project(training, reference, formulation, reduction, prepared, rates)
+    rates = EulerianRates.of(
+        training.functionals[0], reference.points, training.coefficients, listed=False
+    )
+    places = Places.among(rates)
+    project = _Project(training, reference, formulation, reduction, prepared, places)
     mapped = [mapped_run(reference, run, first.fluid) for run in runs]
     largest = formulation.basis(first, reference, mapped, max(modes))
     offline += clock.perf_counter() - before
@@ -234,7 +237,7 @@ def _trained(
     return TrainedModel(
         flow, training.functionals[0], training.coefficients, training.names, training.points,
         law, Between.of(*between), _start_law(flow, training, starts),
-        Between.of(training.points, starts), Indicator.of(flow, project.rates, scale),
+        Between.of(training.points, starts), Indicator.of(flow, project.places, scale),
         time_step=first.time_step, steps_per_snapshot=first.steps_per_snapshot,
         snapshots=len(runs[0].coordinates) - 1, scene=first.name, parameters=first.parameters,
         training=made, source=training,
@@ -323,7 +326,7 @@ def _judged(flow: ReducedFlow, project: _Project, k: int, fields) -> dict[str, f
     except SimulationError:
         return {"error": float("inf"), "residual": float("inf")}
     coordinates = jnp.concatenate([start[None], after])
-    indicator = Indicator.of(flow, project.rates, 1.0)
+    indicator = Indicator.of(flow, project.places, 1.0)
     residual = _residual(indicator, flow, values, time, coordinates)
     return {
         "error": velocity_error(flow, coordinates, fields[:, 1:]), "residual": float(residual)
