@@ -17,7 +17,6 @@ from jaxsph import Trajectory, run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap
-from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
 from ..reference import ReferenceSpace
@@ -29,12 +28,11 @@ from .formulation import Compressible, Formulation
 from .indicator import Indicator, Places, scale_of, velocity_error
 from .laws import Between, Law
 from .linear_closure import LinearClosure
-from .log_density import from_log_density
 from .reduced_flow import ReducedFlow, mapped_run
 from .reduction import Reduction, Tensors
 from .trained_model import TrainedModel, projected_start
+from .training_errors import training_errors
 
-_UNIFORM = 1e-3  # of the largest spread over the points that a field has at any time
 # label and iterations -> context manager that gives a function to report iterations to
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[int], None]]]
 
@@ -225,7 +223,7 @@ def _trained(
         flow, learnt = _closed(flow, training, first, runs, closure, progress)
         made |= learnt
     flow = project.formulation.finished(flow, first, runs, mapped)
-    made["runs"] = _errors(flow, project, runs, mapped)
+    made["runs"] = training_errors(flow, training, runs, mapped)
     if not left_out and not np.isfinite(scale):
         scale = _own_scale(flow, project, runs, mapped)
     made["left_out"] = left_out
@@ -367,46 +365,3 @@ def _closed(flow, training, scene, projected, closure, progress):
         "held_back_loss": None if fitted.validation is None else min(fitted.validation),
     }
     return eqx.tree_at(lambda f: f.system, flow, fitted.system), learnt
-
-
-def _errors(flow: ReducedFlow, project: _Project, projected, mapped) -> list[dict[str, Any]]:
-    """Errors on the training runs: of the projection, and of the reduced run."""
-    training, found = project.training, []
-    for k, (run, fields) in enumerate(zip(projected, mapped, strict=True)):
-        fluid = training.scenes[k].fluid
-        density = from_log_density(jnp.asarray(fields[:, 0].T), fluid)
-        speed = np.linalg.norm(fields[:, 1:], axis=1).T
-        truth = speed, np.asarray(fluid.pressure(density))
-        row: dict[str, Any] = {"parameters": training.named(training.points[k])}
-        row["floor"] = _discrepancies(flow, fluid, run.coordinates, truth)
-        try:
-            after = flow.predict(
-                jnp.asarray(run.coordinates[0]), run.values, *project.steps,
-                len(run.coordinates) - 1,
-            )  # fmt: skip
-        except SimulationError as error:
-            row["errors"] = str(error)
-        else:
-            after = np.concatenate([run.coordinates[:1], after])
-            row["errors"] = _discrepancies(flow, fluid, after, truth)
-        found.append(row)
-    return found
-
-
-def _discrepancies(flow: ReducedFlow, fluid, coordinates, truth) -> dict[str, float]:
-    """Peak and median over time of the discrepancy over all reference points.
-
-    Times at which a field is all but uniform, as at a start from rest, have no relative one.
-    """
-    fields = flow.fields(coordinates, np.arange(len(coordinates)), fluid=fluid)
-    values = np.linalg.norm(fields.velocity, axis=2), fields.pressure
-    found = {}
-    for name, mine, theirs in zip(("velocity", "pressure"), values, truth, strict=True):
-        spread = np.ptp(theirs, axis=1)
-        judged = spread > _UNIFORM * spread.max()
-        percent = np.zeros(1)
-        if judged.any():
-            percent = relative_discrepancy(theirs[judged], mine[judged])
-        found[f"{name}_peak_percent"] = float(percent.max())
-        found[f"{name}_median_percent"] = float(np.median(percent))
-    return found

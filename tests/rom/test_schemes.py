@@ -27,6 +27,14 @@ def test_what_keeps_particles_in_order_is_nothing_on_points():
         assert [effect.name for effect in kept_effects(scene.effects)] == names
 
 
+def test_a_free_surface_has_no_form_on_points():
+    scene = jaxsph.scenes.dam_break(10)
+    with pytest.raises(ValueError, match="effects: a free surface moves across points that stay"):
+        kept_effects(scene.effects)
+    with pytest.raises(ValueError, match="effects: a free surface"):
+        train(lambda mach: jaxsph.scenes.dam_break(10, mach=mach), [{"mach": 0.1}], modes=1)
+
+
 # of 20 x 20 particles; the delta-plus scheme's viscous sum is itself 4 percent off on a lattice
 # (`benchmarks.viscous_sum`), and the vortex has lost 20 percent of its velocity
 @pytest.mark.parametrize("scheme, allowed", [(DeltaPlus(), 0.08), (Consistent(), 0.03)])

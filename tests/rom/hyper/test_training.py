@@ -227,3 +227,38 @@ def test_the_first_snapshot_counts():
     with pytest.raises(ValueError, match="held_back: "):
         closure = jaxsph_rom.LinearClosure({"viscosity": 7.0, "force": 1.0})
         jaxsph_rom.train(make, POINTS, modes=2, closure=closure)
+
+
+def bent(level):
+    """A vortex whose viscosity and start follow no law that is looked for."""
+    scene = make(0.01 * np.exp(level), 0.0)
+    state, share = scene.state, 1.0 + 0.2 * np.sin(level)
+    start = ParticleState(state.position, share * state.velocity, state.density)
+    return dataclasses.replace(scene, state=start)
+
+
+def test_where_no_law_holds_the_family_is_asked_and_a_file_says_that_it_interpolates(tmp_path):
+    points = [{"level": level} for level in (0.0, 0.5, 1.0)]
+    trained = jaxsph_rom.train(bent, points, modes=3)
+    assert trained.law is None and trained.start_law is None
+    prediction = trained.predict({"level": 0.8})
+    assert (prediction.operators, prediction.start) == ("family", "family")
+    assert prediction.values[0, 0] == pytest.approx(0.01 * np.exp(0.8), rel=1e-12)
+
+    @jax.jit
+    def energy(level):
+        return jnp.sum(trained.predict({"level": level}).coordinates[0, -1] ** 2)
+
+    slope = jax.grad(energy)(0.8)
+    wanted = (energy(0.8 + 1e-4) - energy(0.8 - 1e-4)) / 2e-4
+    assert float(slope) == pytest.approx(float(wanted), rel=1e-6)
+    trained.save(tmp_path / "model.h5")
+    again = jaxsph_rom.load(tmp_path / "model.h5")
+    found = again.predict({"level": [0.5, 0.8]})
+    assert (found.operators, found.start) == ("interpolated", "interpolated")
+    # in the middle of three: off by the line between the outer two, over the largest
+    line = 0.5 * (1.0 + np.e) - np.exp(0.5)
+    assert trained.training["interpolation_error"] == pytest.approx(line / np.e, rel=1e-6)
+    np.testing.assert_allclose(found.values[0, 0], 0.01 * np.exp(0.5), rtol=1e-12)
+    between = 0.01 * np.interp(0.8, [0.0, 0.5, 1.0], np.exp([0.0, 0.5, 1.0]))
+    np.testing.assert_allclose(found.values[1, 0], between, rtol=1e-12)
