@@ -111,7 +111,9 @@ def _judge(name: str, settings: Mapping[str, Any], options, results: dict[str, A
         trained = jaxsph_rom.load(path)
     else:
         tell(f"training: {name}")
-        trained = jaxsph_rom.train(make, case.points, case.modes, progress=progress)
+        trained = jaxsph_rom.train(
+            make, case.points, case.modes, closure=case.closure, progress=progress
+        )
         trained.save(path)
     for point in left:
         scene = make(**point)

@@ -18,6 +18,7 @@ from jaxsph.scenes.enclosed import enclosed_flow
 from jaxsph.scenes.scales import Scale
 from jaxsph.schemes import Consistent
 from jaxsph.walls import BoxRegion
+from jaxsph_rom import LinearClosure
 
 
 class Stirring(BodyForce):
@@ -84,11 +85,12 @@ def with_viscosity(effect: Effect, viscosity: float) -> Effect:
 
 
 class Case(NamedTuple):
-    """A family, its training points, and how many modes its model has."""
+    """A family, its training points, how many modes its model has, and its closure."""
 
     make: Callable[..., Scene]
     points: list[dict[str, float]]
     modes: int
+    closure: LinearClosure | None = None
 
 
 def _corners(**ranges: tuple[float, float]) -> list[dict[str, float]]:
@@ -99,8 +101,8 @@ def _corners(**ranges: tuple[float, float]) -> list[dict[str, float]]:
 
 
 CASES = {
-    "vessel": Case(vessel, _corners(viscosity=(0.01, 0.03), force=(0.5, 1.5)), 10),
-    "cavity": Case(cavity, _corners(reynolds=(50.0, 150.0), lid=(0.5, 1.0)), 10),
+    "vessel": Case(vessel, _corners(viscosity=(0.01, 0.03), force=(0.5, 1.5)), 10, LinearClosure()),
+    "cavity": Case(cavity, _corners(reynolds=(50.0, 150.0), lid=(0.5, 1.0)), 10, LinearClosure()),
     "vortex": Case(vortex, _corners(reynolds=(50.0, 150.0), amplitude=(0.5, 1.0)), 6),
-    "channel": Case(channel, [{"reynolds": re} for re in (20.0, 40.0, 80.0)], 6),
+    "channel": Case(channel, [{"reynolds": re} for re in (20.0, 40.0, 80.0)], 6, LinearClosure()),
 }

@@ -45,7 +45,7 @@ def write(group: h5py.Group, name: str, value: Any, path: str = "") -> None:
         for k, item in enumerate(value):
             write(inner, str(k), item, path)
     elif isinstance(value, dict):
-        group.attrs[name] = json.dumps({"dict": value})
+        group.attrs[name] = json.dumps({"dict": value}, default=_plain)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         inner = group.create_group(name)
         inner.attrs["class of"] = imported(type(value), path)
@@ -113,6 +113,11 @@ def _named(place: str) -> Any:
     for part in name.split("."):
         found = getattr(found, part)
     return found
+
+
+def _plain(value: Any) -> Any:
+    """A number or an array of numpy as JSON has it; anything else by what it says of itself."""
+    return value.tolist() if hasattr(value, "tolist") else repr(value)
 
 
 def _is_plain(value: Any) -> bool:

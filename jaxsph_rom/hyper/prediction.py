@@ -32,6 +32,18 @@ _LAYOUT = {
 }
 
 
+class Maker:
+    """The model that made a prediction: known by its identity, so that it is structure under
+    `jax.jit`.
+
+    Args:
+        model: a trained model.
+    """
+
+    def __init__(self, model: TrainedModel):
+        self.model = model
+
+
 class Prediction(eqx.Module):
     """A member for each set of parameters.
 
@@ -48,7 +60,7 @@ class Prediction(eqx.Module):
         start: where members start from: `given`; `family`, as `make` has it at these parameters;
             or `interpolated` between the training runs (static).
         operators: `family`, as `make` has them, or `interpolated` (static).
-        model: that made it.
+        maker: of it; none in a prediction of a file without its model (static).
         run_seconds, compile_seconds: wall-clock time of all members together [s] (static).
     """
 
@@ -62,7 +74,7 @@ class Prediction(eqx.Module):
     outside: Bool[Array, " members"]
     start: str = eqx.field(static=True)
     operators: str = eqx.field(static=True)
-    model: TrainedModel | None = None
+    maker: Maker | None = eqx.field(static=True, default=None)
     indicated: Float[Array, " members"] | None = None
     run_seconds: float = eqx.field(static=True, default=float("nan"))
     compile_seconds: float = eqx.field(static=True, default=float("nan"))
@@ -113,9 +125,9 @@ class Prediction(eqx.Module):
         return int(np.argmax(np.append(lost, True)))
 
     def _with_model(self) -> TrainedModel:
-        if self.model is None:
+        if self.maker is None:
             raise ValueError("model: the prediction has none; load it with model=... as well.")
-        return self.model
+        return self.maker.model
 
 
 def save_prediction(path: str | os.PathLike, prediction: Prediction, source: str) -> None:
@@ -154,7 +166,8 @@ def load_prediction(path: str | os.PathLike, model: TrainedModel | None = None) 
         seconds = {f"{n}_seconds": float(attributes[f"{n}_seconds"]) for n in ("run", "compile")}
         indicated = arrays.pop("error_indicator")
         return Prediction(
-            names=tuple(json.loads(attributes["names"])), model=model,
+            names=tuple(json.loads(attributes["names"])),
+            maker=None if model is None else Maker(model),
             indicated=jnp.asarray(indicated), **arrays, **texts, **seconds,
         )  # fmt: skip
 

@@ -20,7 +20,7 @@ from .family import Training, functional_of, table
 from .indicator import Indicator
 from .laws import Between, Law
 from .log_density import to_log_density
-from .prediction import Prediction
+from .prediction import Maker, Prediction
 from .reduced_flow import ReducedFlow
 from .schedule import EvenTimes, GivenTimes, Schedule
 from .sweep import batch_of, swept
@@ -160,7 +160,7 @@ class TrainedModel(eqx.Module):
         return Prediction(
             names=self.names, points=points, values=values, time=time, coordinates=found,
             status=code, step=step, outside=self._outside(points, time), start=origin,
-            operators=operators, model=self, **seconds,
+            operators=operators, maker=Maker(self), **seconds,
         )  # fmt: skip
 
     def fields(self, prediction: Prediction, member: int, points=None) -> Trajectory:

@@ -85,7 +85,7 @@ def train(
         ...     own = (LaminarViscosity(viscosity), Gravity([force, 0.0]))
         ...     return dataclasses.replace(scene, effects=(*others, *own))
         >>> points = [{"viscosity": v, "force": f} for v, f in ((0.01, 0.5), (0.02, 1.0))]
-        >>> trained = jaxsph_rom.train(make, points, modes=3)
+        >>> trained = jaxsph_rom.train(make, points, modes=5)
         >>> prediction = trained.predict({"viscosity": 0.015, "force": 0.9})
         >>> round(float(prediction.fields(0).velocity[-1, :, 0].mean()), 3)  # 0.9 * 0.06
         0.054

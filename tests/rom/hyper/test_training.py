@@ -29,7 +29,8 @@ def make(viscosity, force, own=(), side=12, **settings):
     scene = taylor_green(side, **settings)
     others = [e for e in scene.effects if not isinstance(e, LaminarViscosity)]
     mine = (LaminarViscosity(jnp.asarray(viscosity)), Gravity(jnp.asarray([force, 0.0])), *own)
-    return dataclasses.replace(scene, effects=(*others, *mine), parameters={})
+    record = {"a": np.float32(1)}  # as a user may have it
+    return dataclasses.replace(scene, effects=(*others, *mine), parameters=record)
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,21 @@ def test_derivatives_in_parameters_and_start(trained):
         assert float(slope) == pytest.approx(float(ahead - behind) / (2 * step), rel=1e-6)
     several = jax.vmap(lambda force: energy(0.015, force, 1.0))(jnp.asarray([0.4, 0.8]))
     assert float(several[1]) == pytest.approx(float(energy(0.015, 0.8, 1.0)), rel=1e-12)
+
+
+def test_a_prediction_comes_out_of_traced_code(trained):
+    point = {"viscosity": 0.015, "force": 0.8}
+    found = jax.jit(lambda force: trained.predict({**point, "force": force}))(0.8)
+    wanted = trained.predict(point)
+    np.testing.assert_allclose(found.coordinates, wanted.coordinates, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.error_indicator, wanted.error_indicator, rtol=1e-9)
+    assert found.fields(0).velocity.shape == wanted.fields(0).velocity.shape
+
+    def after(force, _):
+        return force, trained.predict({**point, "force": force}).coordinates[0, -1]
+
+    _, ends = jax.lax.scan(after, 0.8, None, length=2)
+    np.testing.assert_allclose(ends[1], wanted.coordinates[0, -1], rtol=0, atol=1e-12)
 
 
 def test_times_of_ones_own(trained):
