@@ -29,6 +29,7 @@ from .through_host import through_host
 _EDGE = 1e-6  # of a parameter's range: so much beyond is not outside
 _POSITIVE = (".viscosity", ".sound_speed", ".delta", ".alpha")
 _CANDIDATES = 64
+_MOST_SCENES = 100  # made for the members of a prediction
 
 Parameters = Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
@@ -38,7 +39,11 @@ class TrainedModel(eqx.Module):
 
     Operators at new parameters are those of the scene that the family's `make` gives there, and so
     is the start. Where these follow a law (`Law`) at the training points and at as many probes
-    between them as it takes to test it, the law stands for `make`, in files too.
+    between them as it takes to test it, the law stands for `make`, in files too. Where there is
+    none, `make` is asked for up to 100 members at once; for more, and in a model of a file, it is
+    interpolated between the training points, which the prediction says. Traced code then takes
+    its derivatives by differences (`through_host`); a start that is only known to a tolerance, as
+    one that an iteration finds, has none worth the name: give `Family(make, starts=False)`.
 
     Args:
         flow: basis and dynamics.
@@ -262,7 +267,7 @@ class TrainedModel(eqx.Module):
             if not traced:
                 self._check_values(points, values)
             return values, "family"
-        if self.source is None:
+        if self.source is None or len(points) > _MOST_SCENES:
             by = jax.vmap(self.between)(points) if traced else _host(self.between, points)
             return by, "interpolated"
         return self._by_make(self._made_values, self.coefficients.size, points, traced), "family"
@@ -286,7 +291,8 @@ class TrainedModel(eqx.Module):
         if self.start_law is not None:
             law = self.start_law
             return (jax.vmap(law)(points) if traced else _host(law, points)), "family"
-        if self.source is None or not self.source.family.starts:
+        asked = self.source is not None and self.source.family.starts
+        if not asked or len(points) > _MOST_SCENES:
             by = self.start_between
             return (jax.vmap(by)(points) if traced else _host(by, points)), "interpolated"
         size = self.flow.system.size
