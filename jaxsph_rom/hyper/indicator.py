@@ -47,7 +47,8 @@ class Indicator(eqx.Module):
 
     w the run's fields, du/dt their change in the run, f the functional as it stands, taken at some
     points and times. The scale s [s] makes it a relative error of velocity: what leaving one
-    training run out after the other has shown, in the geometric mean.
+    training run out after the other has shown, in the geometric mean. Of a model with a closure it
+    is what its own runs show, times by how much leaving one out has raised errors without closure.
 
     Args:
         rates: on the points, which come first, and on those around them.

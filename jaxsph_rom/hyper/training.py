@@ -19,12 +19,13 @@ from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import Scene
 
+from ..basis import Energy
 from ..reference import ReferenceSpace
 from .belonging import check_runs
 from .closure import ProjectedRun, fit_linear_closure
 from .eulerian_rates import EulerianRates
 from .family import Family, Training
-from .formulation import Compressible, Formulation
+from .formulation import Formulation, formulation_for
 from .indicator import Indicator, Places, scale_of, velocity_error
 from .laws import Between, Law
 from .linear_closure import LinearClosure
@@ -65,7 +66,7 @@ def train(
         modes: how many.
         runs: of the full model, one for each, where they exist.
         closure: to learn, if any.
-        formulation: `Compressible()` if none is given.
+        formulation: what suits the scene (`formulation_for`) if none is given.
         reduction: `Tensors()` if none is given; `Samples()` for effects that are not quadratic.
         progress: opens a progress bar for each full run and for the closure.
 
@@ -169,7 +170,8 @@ def train_each(
     training = Training(family, parameters)
     first = training.scenes[0]
     _check(training, modes, closure, runs)
-    formulation = Compressible() if formulation is None else formulation
+    if formulation is None:
+        formulation = formulation_for(first, Energy(), closed=closure is not None)
     reduction = Tensors() if reduction is None else reduction
     before = clock.perf_counter()
     reference, prepared = _prepared(training, reduction)
@@ -219,10 +221,14 @@ def _trained(
     scale, left_out = _left_out(project, mapped, basis.size)
     made |= seconds
     made["offline_seconds"] += clock.perf_counter() - before
-    if closure is not None:
+    if closure is None:
+        flow = project.formulation.finished(flow, first, runs, mapped)
+    else:
+        open_ = project.formulation.finished(flow, first, runs, mapped)
         flow, learnt = _closed(flow, training, first, runs, closure, progress)
         made |= learnt
-    flow = project.formulation.finished(flow, first, runs, mapped)
+        flow = project.formulation.finished(flow, first, runs, mapped)
+        scale = _scale_of_closed(flow, open_, project, mapped, left_out)
     made["runs"] = training_errors(flow, training, runs, mapped)
     if not left_out and not np.isfinite(scale):
         scale = _own_scale(flow, project, runs, mapped)
@@ -306,6 +312,17 @@ def _left_out(project: _Project, mapped, modes: int) -> tuple[float, list[dict[s
         found.append(_judged(flow, project, k, mapped[k]))
     scale = scale_of([f["error"] for f in found], [f["residual"] for f in found])
     return scale, found
+
+
+def _scale_of_closed(flow, open_, project: _Project, mapped, left_out) -> float:
+    """The scale of a closed flow: that of its own errors, and by how much leaving a run out makes
+    the errors of the open flow larger; to leave runs out of the closure as well would cost its
+    training once for each."""
+    own = _own_scale(flow, project, None, mapped)
+    before = [_judged(open_, project, k, fields)["error"] for k, fields in enumerate(mapped)]
+    pairs = [(found["error"], b) for found, b in zip(left_out, before, strict=False)]
+    good = [a / b for a, b in pairs if np.isfinite(a) and np.isfinite(b) and a > 0.0 and b > 0.0]
+    return own * max(1.0, float(np.exp(np.mean(np.log(good))))) if good else own
 
 
 def _own_scale(flow, project: _Project, runs, mapped) -> float:
