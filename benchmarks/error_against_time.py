@@ -39,7 +39,7 @@ from jaxsph.plotting.style import (
 )  # fmt: skip
 from jaxsph.scenes import Scene, taylor_green_solution
 from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
-from jaxsph_rom.hyper import LinearClosure, TrainedFlow, mapped_run, train_flows
+from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell, write_json
@@ -110,10 +110,11 @@ def _measured(options) -> dict[str, Any]:
         rows += _moving_rows(options, folder, scenes, judge)
     offline = []
     for closure, family in ((None, TENSOR), (_closure(options), CLOSED)):
-        flows = train_flows(
-            [scenes[re] for re in options.train],
-            [runs[re] for re in options.train],
+        flows = train_each(
+            lambda reynolds: make_scene(options, reynolds),
+            [{"reynolds": re} for re in options.train],
             options.modes,
+            runs=[runs[re] for re in options.train],
             closure=closure,
             progress=progress,
         )
@@ -140,7 +141,8 @@ def _measured(options) -> dict[str, Any]:
 
 def _closure(options) -> LinearClosure:
     held_back = HELD_BACK if HELD_BACK in options.train and len(options.train) > 2 else None
-    return LinearClosure(held_back, iterations=options.iterations)
+    judge = None if held_back is None else {"reynolds": held_back}
+    return LinearClosure(judge, iterations=options.iterations)
 
 
 class _Judge:
@@ -173,7 +175,7 @@ class _Judge:
             **discrepancies("full_", full, profile),
         }
 
-    def reduced(self, family: str, trained: TrainedFlow) -> dict[str, Any]:
+    def reduced(self, family: str, trained: TrainedModel) -> dict[str, Any]:
         """A model on reference points, from the projection of the full run's own start."""
         flow, scene = trained.flow, self.scene
         first = jax.tree.map(lambda field: field[:1], self.run)
@@ -225,7 +227,7 @@ def _moving_rows(options, folder: Path, scenes: dict[float, Scene], judge: _Judg
             yield row | {"modes": modes, "product": product.__name__}
 
 
-def _offline(family: str, trained: TrainedFlow, runs, row) -> dict[str, Any]:
+def _offline(family: str, trained: TrainedModel, runs, row) -> dict[str, Any]:
     """What a model cost before its first run, and after how many runs that is paid back."""
     training = trained.training
     parts = {

@@ -25,7 +25,7 @@ from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.metrics import centre_line
 from jaxsph.scenes import Scene
-from jaxsph_rom.hyper import LinearClosure, TrainedFlow, mapped_run, train_flows
+from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, write_json
@@ -81,10 +81,14 @@ def _measured(options) -> dict[str, Any]:
     runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
     seen = [_until(runs[re], options.until) for re in TRAINED_ON]
     window = min(50, len(seen[0].time) - 1)
+
+    def make(reynolds):
+        return dataclasses.replace(make_scene(options, reynolds), end_time=options.until)
+
     rows = []
-    for closure in (None, LinearClosure(HELD_BACK, window, options.iterations)):
-        flows = train_flows(
-            [scenes[re] for re in TRAINED_ON], seen, options.modes,
+    for closure in (None, LinearClosure({"reynolds": HELD_BACK}, window, options.iterations)):
+        flows = train_each(
+            make, [{"reynolds": re} for re in TRAINED_ON], options.modes, runs=seen,
             closure=closure, progress=progress,
         )  # fmt: skip
         for trained in flows:
@@ -106,16 +110,17 @@ def _measured(options) -> dict[str, Any]:
 def _until(run: Trajectory, time: float) -> Trajectory:
     """The snapshots of a run up to a time [s]."""
     count = int((run.time <= time * (1.0 + 1e-9)).sum())
-    return dataclasses.replace(run, **{name: getattr(run, name)[:count] for name in _FIELDS})
+    cut = {name: getattr(run, name)[:count] for name in _FIELDS}
+    return dataclasses.replace(run, **cut, metadata={})
 
 
-def _judged(trained: TrainedFlow, scene: Scene, run: Trajectory, until: float) -> dict[str, Any]:
+def _judged(trained: TrainedModel, scene: Scene, run: Trajectory, until: float) -> dict[str, Any]:
     """Errors of a prediction in both parts of time, those of the projection, and times."""
     flow, reynolds = trained.flow, scene.parameters["reynolds"]
     before = clock.perf_counter()
-    trained.predict([reynolds], snapshots=len(run.time) - 1)
+    trained.predict({"reynolds": reynolds}, times=run.time)
     first = clock.perf_counter() - before
-    prediction = trained.predict([reynolds], snapshots=len(run.time) - 1)
+    prediction = trained.predict({"reynolds": reynolds}, times=run.time)
     row = {
         "reynolds": reynolds,
         "modes": flow.basis.size,

@@ -38,7 +38,7 @@ from jaxsph.metrics import kinetic_energy
 from jaxsph.plotting import style
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, ReducedModel
-from jaxsph_rom.hyper import QuadraticSystem, TensorModel
+from jaxsph_rom.hyper import PointsModel, QuadraticSystem
 
 from . import measure
 
@@ -288,7 +288,7 @@ def _tensors(case: Case, meter: _Meter) -> dict[str, Any]:
     quadratic = np.random.default_rng(0).standard_normal((size, size, size)) / size**1.5
     linear = np.stack([-np.eye(size), np.zeros((size, size))])
     system = QuadraticSystem(jnp.zeros((2, size)), jnp.asarray(linear), jnp.asarray(quadratic))
-    model, state = TensorModel(system, jnp.asarray(1.0 / REYNOLDS)), jnp.full(size, 0.01)
+    model, state = PointsModel(system, jnp.asarray(1.0 / REYNOLDS)), jnp.full(size, 0.01)
     run, dt = partial(_run_of, steps=_TENSOR_STEPS), jnp.asarray(1e-3)
     _good(meter.first(STEP, run, model, state, dt, steps=_TENSOR_STEPS))
     return {}

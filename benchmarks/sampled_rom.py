@@ -30,11 +30,11 @@ from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
 from jaxsph_rom.hyper import (
     QDEIM,
+    Chosen,
     EulerianRates,
     NonNegativeWeights,
-    SampledModel,
-    Samples,
-    TensorModel,
+    PointsModel,
+    SampledRates,
     VisitedStates,
     mapped_run,
     rate_basis,
@@ -160,16 +160,18 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             row = dict(zip(KEY, case, strict=True))
             start = clock.perf_counter()
             if row["selection"] == "tensors":
-                model = TensorModel(flow.system, viscosity)
+                model = PointsModel(flow.system, viscosity)
             elif row["selection"] == "all points":
                 model = _on_all_points(rates, flow.basis, viscosity)
             else:
                 sampling = SELECTIONS[row["selection"]](row["wanted"])
                 samples = sampling.choose(flow.basis, modes_of_rates)
-                model = SampledModel.of_samples(rates, flow.basis, samples, viscosity)
+                rates_there = SampledRates.of_samples(rates, flow.basis, samples)
+                model = PointsModel(rates_there, viscosity)
             row["offline_s"] = clock.perf_counter() - start
-            if isinstance(model, SampledModel):
-                row |= {"samples": model.gather.shape[1], "members": len(model.modes)}
+            if row["selection"] != "tensors":
+                there = model.dynamics
+                row |= {"samples": there.gather.shape[1], "members": len(there.modes)}
             found, online = _integrated(model, first, scene, len(run.time) - 1)
             row |= online | floor
             if row["stable"]:
@@ -185,11 +187,10 @@ def _visited(viscosity: float, time, coordinates) -> VisitedStates:
     return VisitedStates(viscosity, time[some], coordinates[some])
 
 
-def _on_all_points(rates: EulerianRates, basis, viscosity) -> SampledModel:
+def _on_all_points(rates: EulerianRates, basis, viscosity) -> PointsModel:
     tested = np.moveaxis(basis.modes * np.asarray(basis.weights)[None, :, None], 2, 0)
-    return SampledModel.of_samples(
-        rates, basis, Samples(np.arange(len(rates.points)), tested), viscosity
-    )
+    everywhere = Chosen(np.arange(len(rates.points)), tested)
+    return PointsModel(SampledRates.of_samples(rates, basis, everywhere), viscosity)
 
 
 def _integrated(model: Model, first, scene, snapshots: int):

@@ -25,7 +25,7 @@ from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
 from jaxsph.scenes import Scene
-from jaxsph_rom.hyper import LinearClosure, TrainedFlow, mapped_run, train_flows
+from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, summary, write_json
@@ -81,11 +81,12 @@ def _measured(options) -> dict[str, Any]:
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     scenes = {re: make_scene(options, re) for re in sorted({*TRAINED_ON, *options.judged})}
     runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
-    (trained,) = train_flows(
-        [scenes[re] for re in TRAINED_ON],
-        [runs[re] for re in TRAINED_ON],
-        (options.modes,),
-        closure=LinearClosure(HELD_BACK, iterations=options.iterations),
+    trained = train(
+        lambda reynolds: make_scene(options, reynolds),
+        [{"reynolds": re} for re in TRAINED_ON],
+        options.modes,
+        runs=[runs[re] for re in TRAINED_ON],
+        closure=LinearClosure({"reynolds": HELD_BACK}, iterations=options.iterations),
         progress=progress,
     )
     results = _times(trained, options.members)
@@ -103,26 +104,24 @@ def _measured(options) -> dict[str, Any]:
     }
 
 
-def _times(trained: TrainedFlow, members: int) -> dict[str, Any]:
+def _times(trained: TrainedModel, members: int) -> dict[str, Any]:
     """Of all members in one call, and of some of them run one by one."""
     reynolds = np.linspace(TRAINED_ON[0], TRAINED_ON[-1], members)
     swept = []
     with progress("sweeps", _REPEATS) as report:
         for _ in range(_REPEATS):
             before = clock.perf_counter()
-            prediction = trained.predict(reynolds)
+            prediction = trained.predict({"reynolds": reynolds})
             swept.append((prediction, clock.perf_counter() - before))
             report(1)
     alone = []
     chosen = np.linspace(0, members - 1, 1 + min(members, _SINGLE_RUNS)).astype(int)
     worst = 0.0
     for k in chosen:
-        viscosity = trained.speed_times_length / reynolds[k]
         start = jnp.asarray(prediction.coordinates[k, 0])
         before = clock.perf_counter()
-        found = trained.flow.predict(
-            start, viscosity, trained.time_step, trained.steps_per_snapshot, trained.snapshots
-        )
+        steps = trained.time_step, trained.steps_per_snapshot, trained.snapshots
+        found = trained.flow.predict(start, prediction.values[k], *steps)
         found = np.asarray(found)
         alone.append(clock.perf_counter() - before)
         apart = np.abs(found - prediction.coordinates[k, 1:]).max() / np.abs(found).max()
@@ -138,10 +137,10 @@ def _times(trained: TrainedFlow, members: int) -> dict[str, Any]:
     }
 
 
-def _judged(trained: TrainedFlow, scene: Scene, run: Trajectory) -> dict[str, Any]:
+def _judged(trained: TrainedModel, scene: Scene, run: Trajectory) -> dict[str, Any]:
     """Errors of a member on the centre line beside those of the projection."""
     reynolds, line = scene.parameters["reynolds"], centre_line(scene.space)
-    prediction = trained.predict([reynolds])
+    prediction = trained.predict({"reynolds": reynolds})
     flow = trained.flow
     truth = probe(run, line, scene.space)
     projected = flow.project(mapped_run(flow.reference, run, scene.fluid))

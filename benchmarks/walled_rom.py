@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +33,15 @@ from jaxsph.scenes import SCENES, Scene
 from jaxsph_rom import low_pass
 from jaxsph_rom.hyper import (
     Compressible,
+    Family,
     LinearClosure,
     Solenoidal,
-    TrainedFlow,
+    TrainedModel,
     mapped_run,
-    train_flows,
+    train_each,
 )
+from jaxsph_rom.hyper.linear_closure import held_back
 from jaxsph_rom.hyper.log_density import from_log_density
-from jaxsph_rom.hyper.training import held_back, viscosity_of
 from jaxsph_rom.study import PLANS, full_run
 
 from .measure import format_rows, number, progress, read_json, repeated, summary, tell, write_json
@@ -121,8 +122,8 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
     train = tuple(options.train or plan.train)
     predict, sizes = options.predict or plan.predict, options.modes or plan.modes
     folder = options.out or Path("out", f"walled-rom-{options.scene}-{options.scale}")
-    make = _maker(options, folder)
-    scenes = {re: make(re) for re in sorted({*train, *predict})}
+    family = _maker(options, folder)
+    scenes = {re: family.make(re) for re in sorted({*train, *predict})}
     runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
     first = scenes[train[0]]
     line = plan.probes(first)
@@ -145,14 +146,16 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             if not left:
                 continue
             tell(f"training: {formulation}, closure {closure}")
-            learnt = LinearClosure(held_back(train), iterations=options.iterations)
-            flows = train_flows(
-                [scenes[re] for re in train],
-                [runs[re] for re in train],
+            parameters = [{"reynolds": re} for re in sorted(train, reverse=True)]
+            learnt = LinearClosure(held_back(parameters), iterations=options.iterations)
+            flows = train_each(
+                family,
+                parameters,
                 left,
-                FORMULATIONS[formulation],
-                learnt if closure == "linear" else None,
-                progress,
+                runs=[runs[named["reynolds"]] for named in parameters],
+                formulation=FORMULATIONS[formulation],
+                closure=learnt if closure == "linear" else None,
+                progress=progress,
             )
             for trained in flows:
                 case = {"formulation": formulation, "closure": closure,
@@ -166,17 +169,23 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
                     write_json(path, results)
 
 
-def _maker(options, folder: Path):
-    """The scene as a function of the Reynolds number, settled first where the plan says so."""
+def _maker(options, folder: Path) -> Family:
+    """The scenes of any Reynolds number, settled first where the plan says so."""
     plan = PLANS[options.scene]
     settings = {"scale": options.scale, "resolution": options.resolution, "dtype": "float64"}
     if options.end_time is not None:
         settings["end_time"] = options.end_time
     scene = partial(SCENES[options.scene], **settings)
     if plan.settling is None:
-        return lambda reynolds: scene(reynolds=reynolds)
-    made = dataclasses.replace(plan, settling=options.settling or plan.settling)
-    return made.scenes(scene, folder, progress)
+        return Family(lambda reynolds: scene(reynolds=reynolds))
+    settling = options.settling or plan.settling
+    made = dataclasses.replace(plan, settling=settling)
+    settled = cache(made.scenes(scene, folder, progress))
+    return Family(
+        lambda reynolds: settled(reynolds=reynolds),
+        starts=False,
+        probe=lambda reynolds: scene(reynolds=reynolds, start_time=settling),
+    )
 
 
 class _Truth:
@@ -188,7 +197,7 @@ class _Truth:
         self.fields: np.ndarray | None = None  # (r, u) on the reference points, mapped once
         self.sound: dict[str, np.ndarray] = {}
 
-    def everywhere(self, trained: TrainedFlow, scene: Scene, run: Trajectory):
+    def everywhere(self, trained: TrainedModel, scene: Scene, run: Trajectory):
         """The same on the reference points; the pressure's fast part is kept as `sound`."""
         flow = trained.flow
         if self.fields is None:
@@ -204,13 +213,14 @@ class _Truth:
 
 
 def _judged(
-    trained: TrainedFlow, scene: Scene, run: Trajectory, truth: _Truth, judged_from: float
+    trained: TrainedModel, scene: Scene, run: Trajectory, truth: _Truth, judged_from: float
 ) -> dict[str, Any]:
     """Errors on the line and over all points, floors, the full model's sound, and times."""
     flow = trained.flow
     on_points = truth.everywhere(trained, scene, run)
     projected = flow.project(truth.fields)
-    arguments = viscosity_of(scene), scene.time_step, scene.steps_per_snapshot, len(run.time) - 1
+    steps = scene.time_step, scene.steps_per_snapshot, len(run.time) - 1
+    arguments = (1.0 / scene.parameters["reynolds"], *steps)
     seconds, fault, found = [], None, None
     try:
         found, _, seconds = repeated(lambda: flow.predict(projected[0], *arguments), _REPEATS)
@@ -255,7 +265,7 @@ def _figures(name: str, percent: np.ndarray, late: np.ndarray) -> dict[str, floa
     }
 
 
-def _offline(trained: TrainedFlow) -> dict[str, Any]:
+def _offline(trained: TrainedModel) -> dict[str, Any]:
     names = ("offline_seconds", "closure_seconds", "held_back", "loss", "held_back_loss")
     return {name: trained.training.get(name) for name in names}
 

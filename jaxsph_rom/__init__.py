@@ -18,7 +18,17 @@ from .basis import projection_errors as projection_errors
 from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
 from .field_advection import PaperAdvection as PaperAdvection
+from .hyper import Compressible as Compressible
+from .hyper import LinearClosure as LinearClosure
+from .hyper import Prediction as Prediction
+from .hyper import Samples as Samples
+from .hyper import Solenoidal as Solenoidal
+from .hyper import Tensors as Tensors
+from .hyper import TrainedModel as TrainedModel
+from .hyper import load as load
+from .hyper import save as save
 from .hyper import sweep as sweep
+from .hyper import train as train
 from .lattice_polynomials import LatticePolynomials as LatticePolynomials
 from .mode_interpolation import ModeInterpolation as ModeInterpolation
 from .model import ReducedModel as ReducedModel

@@ -25,7 +25,7 @@ from .basis import Basis
 from .field_advection import Advection, PaperAdvection
 from .mode_interpolation import ModeInterpolation
 from .projection import Projection, PseudoInverse
-from .still_walls import check_still
+from .still_walls import check_moving_particles
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
 
@@ -97,7 +97,7 @@ class ReducedModel(Model):
             ValueError: if the interpolation is not of `basis.functions`, or bodies are moved
                 through the fluid.
         """
-        check_still(scene)
+        check_moving_particles(scene)
         wanted, found = basis.functions[0].size, interpolation.functions
         if found != wanted:
             raise ValueError(

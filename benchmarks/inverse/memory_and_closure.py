@@ -24,7 +24,7 @@ from jaxsph_rom import (
     ReferenceSpace,
     pod,
 )
-from jaxsph_rom.hyper import LinearClosure, train_flows
+from jaxsph_rom.hyper import LinearClosure, train
 
 from .problem import descend
 
@@ -39,13 +39,15 @@ def solve(
     The loss of tau is the energy of the error of the coordinates over that of the coordinates, in
     the run that the basis is of.
     """
-    scenes = [
-        taylor_green(side, reynolds, end_time=end_time, arrangement=Lattice())
-        for reynolds in (100.0, 200.0)
-    ]
+
+    def make(reynolds):
+        return taylor_green(side, reynolds, end_time=end_time, arrangement=Lattice())
+
+    parameters = [{"reynolds": 100.0}, {"reynolds": 200.0}]
+    scenes = [make(**named) for named in parameters]
     runs = [run_scene(scene) for scene in scenes]
     return {"tau": _memory(scenes[0], runs[0], modes, steps)} | {
-        "closure": _closure(scenes, runs, modes, iterations)
+        "closure": _closure(make, parameters, runs, modes, iterations)
     }
 
 
@@ -88,18 +90,22 @@ def _memory(scene, trajectory, modes: int, steps: int) -> dict[str, Any]:
     }
 
 
-def _closure(scenes, runs, modes: int, iterations: int) -> dict[str, Any]:
+def _closure(make, parameters, runs, modes: int, iterations: int) -> dict[str, Any]:
     window = min(50, len(runs[0].time) - 1)
     learnt = LinearClosure(window=window, iterations=iterations)
     made = {
-        name: next(train_flows(scenes, runs, [modes], closure=closure)).training
+        name: train(make, parameters, modes, runs=runs, closure=closure).training
         for name, closure in (("none", None), ("linear", learnt))
     }
     return {
         "modes": modes,
         "iterations": iterations,
         "seconds": made["linear"]["closure_seconds"],
-        "floor": made["none"]["floor"],
-        "without": made["none"]["errors"],
-        "with": made["linear"]["errors"],
+        "floor": _by_reynolds(made["none"], "floor"),
+        "without": _by_reynolds(made["none"], "errors"),
+        "with": _by_reynolds(made["linear"], "errors"),
     }
+
+
+def _by_reynolds(training: dict[str, Any], kind: str) -> dict[str, Any]:
+    return {f"{run['parameters']['reynolds']:g}": run[kind] for run in training["runs"]}

@@ -20,20 +20,23 @@ from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.cli.run import ADVECTIONS, INTERPOLATIONS, MAPS, MEMORIES
 from jaxsph_rom.hyper import (
     QDEIM,
+    Coefficients,
     Compressible,
     EulerianRates,
     LinearClosure,
     NonNegativeWeights,
+    PointsModel,
     ReducedFlow,
-    SampledModel,
+    SampledRates,
     Solenoidal,
-    TrainedFlow,
+    TrainedModel,
     VisitedStates,
     mapped_run,
     rate_basis,
-    train_flows,
+    train_each,
 )
-from jaxsph_rom.hyper.training import held_back, viscosity_of
+from jaxsph_rom.hyper.fixed_points import on_points
+from jaxsph_rom.hyper.linear_closure import held_back
 
 from ..measure import Clocked, progress, repeated, summary
 from .full import training_runs
@@ -136,15 +139,27 @@ def _projection(setting: ReducedSetting, scene: Scene):
 
 def _trained(
     case: Case, setting: ReducedSetting, scenes: dict[float, Scene], runs: dict[float, Trajectory]
-) -> TrainedFlow:
+) -> TrainedModel:
     formulation = Solenoidal()
     if setting.formulation == "compressible":
         formulation = Compressible(PRODUCTS[setting.product]())
-    closure = LinearClosure(held_back(case.trained_on)) if setting.closure == "linear" else None
-    (trained,) = train_flows(
-        list(scenes.values()), list(runs.values()), (setting.modes,), formulation, closure, progress
-    )
+    (name,) = {scene.name for scene in scenes.values()}
+    parameters = [{"reynolds": reynolds} for reynolds in scenes]
+
+    def make(reynolds):
+        return make_scene(name, case, setting.training, reynolds)
+
+    closure = LinearClosure(held_back(parameters)) if setting.closure == "linear" else None
+    (trained,) = train_each(
+        make, parameters, (setting.modes,), runs=list(runs.values()),
+        formulation=formulation, closure=closure, progress=progress,
+    )  # fmt: skip
     return trained
+
+
+def _viscosity(scene: Scene) -> float:
+    (viscosity,) = Coefficients.named(on_points(scene), "viscosity").values(on_points(scene))
+    return float(viscosity)
 
 
 def _start(flow: ReducedFlow, scene: Scene):
@@ -164,7 +179,7 @@ def _tensor(case: Case, setting, scene: Scene, scenes, runs) -> tuple[Trajectory
     training = clock.perf_counter() - begin
     flow, start = trained.flow, _start(trained.flow, scene)
     intervals = scene.steps // scene.steps_per_snapshot
-    steps = viscosity_of(scene), scene.time_step, scene.steps_per_snapshot, intervals
+    steps = _viscosity(scene), scene.time_step, scene.steps_per_snapshot, intervals
     found, first, seconds = repeated(lambda: flow.predict(start[0], *steps), _REPEATS)
     return _fields(flow, scene, start, found), {
         "run_seconds": summary(seconds),
@@ -186,11 +201,11 @@ def sampled(case: Case, setting, scene: Scene, scenes, runs) -> tuple[Trajectory
     for reynolds, run in runs.items():
         some = np.unique(np.linspace(0, len(run.time) - 1, _STATES).round().astype(int))
         coordinates = np.asarray(flow.project(mapped_run(flow.reference, run, scene.fluid)))
-        viscosity = viscosity_of(scenes[reynolds])
+        viscosity = _viscosity(scenes[reynolds])
         visited.append(VisitedStates(viscosity, run.time[some], coordinates[some]))
     sampling = SAMPLINGS[setting.hyper](setting.samples)
     samples = sampling.choose(flow.basis, rate_basis(rates, flow.basis, visited))
-    model = SampledModel.of_samples(rates, flow.basis, samples, viscosity_of(scene))
+    model = PointsModel(SampledRates.of_samples(rates, flow.basis, samples), _viscosity(scene))
     training = clock.perf_counter() - begin
     start = _start(flow, scene)
     found, first, seconds = repeated(lambda: _integrated(model, start[0], scene), _SAMPLED_REPEATS)
@@ -201,11 +216,11 @@ def sampled(case: Case, setting, scene: Scene, scenes, runs) -> tuple[Trajectory
         "run_seconds": summary(seconds),
         "compile_seconds": first - float(np.median(seconds)),
         "training_seconds": training,
-        "points_read": len(model.modes),
+        "points_read": len(model.dynamics.modes),
     }
 
 
-def _integrated(model: SampledModel, coordinates, scene: Scene):
+def _integrated(model: PointsModel, coordinates, scene: Scene):
     step = jnp.asarray(scene.time_step, coordinates.dtype)
     each, intervals = scene.steps_per_snapshot, scene.steps // scene.steps_per_snapshot
     return _run(model, coordinates, step, each, intervals)

@@ -7,7 +7,9 @@ from ..kernel_moments import lattice_moments
 from ..pairs import PairTerm
 from ..symmetric import product, times
 from .base import Effect, WallTerm, given
-from .wall_pressure import GHOST_WEIGHT, per_weight
+from .continuity import Continuity
+from .pressure_force import PressureForce
+from .wall_pressure import GHOST_WEIGHT, WallPressure, per_weight
 
 _LONELY = 0.05  # of a full neighbourhood's kernel sum: no mean is taken over fewer
 
@@ -125,6 +127,10 @@ class AdjointPressure(Effect):
     Raises:
         ValueError: where bodies are moved through the fluid, and beside `FreeSurface`.
     """
+
+    def on_fixed_points(self):
+        # in good order the plain pair is accurate, and each other's adjoint as it is
+        return (Continuity(), PressureForce(), WallPressure())
 
     def geometry_terms(self, space):
         return (

@@ -90,6 +90,14 @@ class Effect(eqx.Module):
         """Whether the fluid may leave a part of its vessel or its box empty."""
         return False
 
+    def on_fixed_points(self) -> tuple[Effect, ...]:
+        """What the effect is at points that do not move: itself, unless it says otherwise.
+
+        Raises:
+            ValueError: if it has no meaning there.
+        """
+        return (self,)
+
     def step_limit(self, fluid: Fluid, space: Space) -> Float[Array, ""] | float:
         """The longest stable step [s] as far as this effect goes."""
         return math.inf

@@ -22,6 +22,9 @@ class ConsistentTransport(Effect):
     Needs the shift velocity, `KernelCorrection` and `DensityDiffusion` before it.
     """
 
+    def on_fixed_points(self):
+        return ()  # nothing is shifted there
+
     def wall_geometry_terms(self, space):
         return (WallTerm("wall_share", (), (), neighbor_share),)
 

@@ -41,6 +41,12 @@ class FreeSurface(Effect):
     def frees_surface(self):
         return True
 
+    def on_fixed_points(self):
+        raise ValueError(
+            "effects: a free surface moves across points that stay, and FreeSurface has no form "
+            "there; choose a scene whose fluid fills its box or vessel."
+        )
+
     def geometry_terms(self, space):
         return (PairTerm("support_matrix", (), support_matrix), KERNEL_GRADIENT)
 

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 
 from ..pairs import PairTerm
 from .base import Effect, WallTerm, viscous_step_limit
+from .isotropic_viscosity import IsotropicViscosity
 
 
 def viscous_sum(pair, i, j):
@@ -24,6 +25,9 @@ class LaminarViscosity(Effect):
     """
 
     viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def on_fixed_points(self):
+        return (IsotropicViscosity(self.viscosity),)  # on a lattice the more accurate form
 
     def step_limit(self, fluid, space):
         return viscous_step_limit(self.viscosity, space)

@@ -32,6 +32,9 @@ class PairRepulsion(Effect):
     conserves momentum; among evenly spread particles it is zero.
     """
 
+    def on_fixed_points(self):
+        return ()  # points lie evenly
+
     def rate_terms(self, space):
         return (PairTerm("closeness", (), Closeness(_RANGE * space.spacing)),)
 

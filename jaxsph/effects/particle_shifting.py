@@ -49,6 +49,9 @@ class ParticleShifting(Effect):
     The norm is guarded, so that a particle without shift has a derivative.
     """
 
+    def on_fixed_points(self):
+        return ()  # points are spread as they are
+
     def geometry_terms(self, space):
         return (shifting_term(space),)
 

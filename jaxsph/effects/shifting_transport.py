@@ -55,6 +55,9 @@ class ShiftingTransport(Effect):
     shift velocity is the particle's own, its part along the wall's normal reversed.
     """
 
+    def on_fixed_points(self):
+        return ()  # nothing is shifted there
+
     def rate_terms(self, space):
         return (
             PairTerm("shift_divergence", ("shift_velocity",), shift_divergence),

@@ -20,6 +20,9 @@ class StrainShifting(Effect):
     with h, as Michel et al. (2022) ask of a convergent and invariant law. Needs `KernelCorrection`.
     """
 
+    def on_fixed_points(self):
+        return ()  # points are spread as they are
+
     def geometry_terms(self, space):
         return (shifting_term(space),)
 

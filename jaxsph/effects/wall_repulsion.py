@@ -36,6 +36,9 @@ class WallRepulsion(Effect):
         stiffness = 2.0 * _STRENGTH * (1.0 - _NEAREST / _RANGE) / _RANGE
         return _RUNGE_KUTTA / stiffness**0.5 * space.spacing / fluid.sound_speed
 
+    def on_fixed_points(self):
+        return ()  # no point comes near a wall
+
     def rates(self, context, fields, sums):
         distance, spacing = self._distance(context.bodies), context.space.spacing
         position, reach = fields["position"], _RANGE * spacing

@@ -12,7 +12,7 @@ from .model import Model
 def ode_term(model: Model, auxiliary: Any) -> diffrax.ODETerm:
     """dy/dt = rates(t, y) of a model, its auxiliary structure held as it is.
 
-    For a model without auxiliary structure (`TensorModel`) this is the whole model. A neighbour
+    For a model without auxiliary structure (`PointsModel`) this is the whole model. A neighbour
     list holds only while no particle has moved by more than half its skin from where it was made:
     integrate that far at most, ask `model.inspect(step, state, auxiliary)` at the end, and go on
     from `model.finish(state)` with a term made anew. Solvers try stages beyond their steps, and

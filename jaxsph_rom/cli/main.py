@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxsph import __version__
 from jaxsph.cli import Parser, report_errors
 
-from . import advise, predict, run, train
+from . import advise, predict, run, suggest, train
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -22,6 +22,6 @@ def _parser() -> Parser:
     parser = Parser("jaxsph-rom", description="Projection-based reduced models of SPH flows.")
     parser.add_argument("--version", action="version", version=f"jaxsph-rom {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for command in (run, train, predict, advise):
+    for command in (run, train, predict, suggest, advise):
         command.add_to(commands)
     return parser

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -16,18 +17,18 @@ from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from jaxsph.scenes import SCENES, Scene
 
 from ..basis import Energy, Euclidean
-from ..hyper import Compressible, Formulation, Solenoidal
-from ..hyper.fixed_points import check_steady
+from ..hyper import Compressible, Family, Formulation, Solenoidal
 from ..study import PLANS, Plan, quiet
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 CLOSURES = ("none", "linear")
 FORMULATIONS = ("compressible", "solenoidal")
+KNOWN = tuple(n for n, make in SCENES.items() if "reynolds" in inspect.signature(make).parameters)
 
 
 def add_training_options(add) -> None:
     """What full runs are made and how they are reduced."""
-    add("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
+    add("scene", metavar="SCENE", help=f"one of {', '.join(KNOWN)}")
     add("--train", type=positive_float, nargs="+", metavar="RE",
         help=f"Reynolds numbers to train on ({defaults('train')})")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="energy",
@@ -75,7 +76,12 @@ def check_scene(options) -> None:
     """A ValueError if there is no such scene."""
     if options.scene not in SCENES:
         raise ValueError(
-            f"scene {options.scene!r} is not known; choose one of {', '.join(SCENES)}."
+            f"scene {options.scene!r} is not known; choose one of {', '.join(KNOWN)}."
+        )
+    if options.scene not in KNOWN:
+        raise ValueError(
+            f"scene {options.scene} has no Reynolds number; choose one of {', '.join(KNOWN)}, or "
+            "train on parameters of its own by jaxsph_rom.train."
         )
 
 
@@ -113,6 +119,14 @@ def planned(options, needed: tuple[str, ...], given: dict[str, Any]) -> Plan:
     return dataclasses.replace(plan, **given)
 
 
+def said(parameters: Mapping[str, float]) -> str:
+    """Parameters as a line says them."""
+    return ", ".join(
+        f"Re {value:g}" if name == "reynolds" else f"{name} {value:g}"
+        for name, value in parameters.items()
+    )
+
+
 def distinct(values) -> tuple[float, ...]:
     """Values without repetitions, in the order given."""
     return tuple(dict.fromkeys(values))
@@ -125,8 +139,9 @@ def scene_maker(
     folder: Path,
     on_points: bool,
     check: Callable[[Scene], None] | None = None,
-) -> Callable[[float], Scene]:
-    """The scene as a function of the Reynolds number; bad input is met before the packing.
+    trained: Callable[[Family], None] | None = None,
+) -> Family:
+    """The scenes of any Reynolds number; bad input is met before the packing.
 
     Args:
         options: of the command.
@@ -134,9 +149,9 @@ def scene_maker(
         reynolds: Reynolds numbers that will be run.
         folder: where runs that settle are kept.
         on_points: whether models on reference points are made of the runs. Flows without walls
-            then start from stirred particles at a balanced pressure, and a force that changes with
-            time is refused.
+            then start from stirred particles at a balanced pressure.
         check: what else must hold of the scene, with its particles on a lattice.
+        trained: what must hold of the scenes that are trained on, likewise.
     """
     make = SCENES[options.scene]
     settings = {
@@ -150,12 +165,13 @@ def scene_maker(
         settings["end_time"] = options.t_end
     plan.scenes(make, folder, bar)  # refuses to let what starts from rest settle
     started = {} if plan.settling is None else {"start_time": plan.settling}
+    lattice = ARRANGEMENTS["lattice"](seed=0)
+    plain = partial(make, arrangement=lattice, **started, **settings)
     for number in reynolds:
-        lattice = ARRANGEMENTS["lattice"](seed=0)
-        cheap = make(reynolds=number, arrangement=lattice, **started, **settings)
+        cheap = plain(reynolds=number)
         plan.probes(cheap)
-    if on_points:
-        check_steady(cheap, cheap.state.position)
+    if trained is not None:
+        trained(Family(lambda reynolds: plain(reynolds=reynolds)))
     if check is not None:
         check(cheap)
     start_quiet = on_points and cheap.walls is None
@@ -164,7 +180,17 @@ def scene_maker(
         rule = ARRANGEMENTS[arrangement or "packed"]
         settings["arrangement"] = rule(seed=options.seed or 0)
     scene = plan.scenes(partial(make, **settings), folder, bar)
-    return (lambda re: quiet(scene(reynolds=re))) if start_quiet else lambda re: scene(reynolds=re)
+    looked_at = partial(make, **started, **settings)
+
+    def started_quietly(reynolds):
+        found = scene(reynolds=reynolds)
+        return quiet(found) if start_quiet else found
+
+    return Family(
+        started_quietly,
+        starts=plan.settling is None,
+        probe=None if plan.settling is None else lambda reynolds: looked_at(reynolds=reynolds),
+    )
 
 
 @contextmanager

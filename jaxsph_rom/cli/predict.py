@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import argparse
 import json
+import math
 import sys
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +19,10 @@ from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
 from jaxsph.io import check_target
 
-from ..hyper import Prediction, TrainedFlow, load_flow, save_prediction
+from ..hyper import Prediction, TrainedModel, load, save_prediction
 from ..hyper.member_files import write_fields, write_tracers
 from ..report.plain import plain
-from .options import bar, distinct
+from .options import bar, distinct, said
 from .train import print_errors
 
 _MOST_FILES = 100  # with fields or tracers
@@ -31,15 +34,18 @@ def add_to(commands) -> None:
     """Add the command to a parser's commands."""
     predict = commands.add_parser(
         "predict",
-        help="run the file of a reduced model at any Reynolds numbers",
-        description="Run a model that `jaxsph-rom train` made at any number of Reynolds numbers at "
-        "once, and write their coordinates over time to DIR/prediction.h5.",
+        help="run the file of a reduced model at any parameters",
+        description="Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
+        "of parameters at once, and write their coordinates over time to DIR/prediction.h5.",
     )
     predict.set_defaults(command=_predict)
     add = predict.add_argument
     add("model", type=Path, metavar="FILE", help="of the model")
-    add("--reynolds", type=reynolds_numbers, nargs="+", required=True, metavar="RE",
+    add("--reynolds", type=reynolds_numbers, nargs="+", metavar="RE",
         help="Reynolds numbers, or START:STOP:COUNT for COUNT of them, evenly spaced")  # fmt: skip
+    add("--at", type=named_numbers, nargs="+", metavar="NAME=VALUE",
+        help="parameters of the model by name, each a number, several with commas between them, or "
+        "START:STOP:COUNT; all combinations are run")  # fmt: skip
     add("--t-end", type=positive_float, metavar="T",
         help="end time [s] (default: that of the training runs)")  # fmt: skip
     add("--fields", action="store_true",
@@ -60,16 +66,16 @@ def _predict(options) -> int:
         if target is not None:
             check_target(target)
     with jax.enable_x64(True):  # whatever the file holds is kept
-        trained = load_flow(options.model)
-    with jax.enable_x64(trained.starts.dtype == np.float64):
-        reynolds = np.array(distinct(value for part in options.reynolds for value in part))
-        snapshots = trained.snapshots
-        if options.t_end is not None:
-            snapshots = trained.intervals_to(options.t_end)
-        _check(options, trained, reynolds, snapshots)
-        _warn(trained, reynolds, snapshots)
-        with bar(f"Re, M = {trained.flow.basis.size}", len(reynolds)) as report:
-            prediction = trained.predict(reynolds, snapshots, report)
+        trained = load(options.model)
+    with jax.enable_x64(trained.flow.reference.points.dtype == np.float64):
+        points = _points(options, trained)
+        times = _times(options, trained)
+        _check(options, trained, points, times)
+        with bar(f"M = {trained.flow.basis.size}", len(points)) as report:
+            prediction = trained.predict(
+                dict(zip(trained.names, points.T, strict=True)), times=times, progress=report
+            )
+        _warn(trained, prediction)
         save_prediction(path, prediction, options.model.name)
         lost = _write_members(options, trained, prediction, folder)
     results = _results(options, trained, prediction, path)
@@ -81,40 +87,104 @@ def _predict(options) -> int:
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
 
-def _check(options, trained: TrainedFlow, reynolds: np.ndarray, snapshots: int) -> None:
-    """A ValueError for what asks too much."""
-    count = len(reynolds)
+def named_numbers(text: str) -> tuple[str, tuple[float, ...]]:
+    """A parameter's name and values."""
+    name, equals, values = text.partition("=")
+    found: list[float] = []
+    for part in values.split(","):
+        try:
+            if part.count(":") == 2:
+                low, high, count = part.split(":")
+                found += np.linspace(float(low), float(high), int(count)).tolist()
+            else:
+                found.append(float(part))
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"NAME=VALUE with numbers, got {text!r}") from None
+    if not name or not equals or not found or not np.isfinite(found).all():
+        raise argparse.ArgumentTypeError(f"NAME=VALUE with finite numbers, got {text!r}")
+    return name, tuple(found)
+
+
+def _points(options, trained: TrainedModel) -> np.ndarray:
+    """A row of parameters a member."""
+    given: dict[str, tuple[float, ...]] = {}
+    if options.reynolds is not None:
+        given["reynolds"] = distinct(value for part in options.reynolds for value in part)
+    for name, values in options.at or ():
+        given[name] = distinct((*given.get(name, ()), *values))
+    if set(given) != set(trained.names):
+        wanted = " ".join(f"{name}=..." for name in trained.names)
+        raise ValueError(f"--at: give a value of each parameter of the model: --at {wanted}")
+    count = math.prod(len(values) for values in given.values())
     if count > MOST_NUMBERS:
-        raise ValueError(f"--reynolds: {count} of them; give at most {MOST_NUMBERS} a call.")
-    size = count * (snapshots + 1) * trained.starts[0].nbytes
+        raise ValueError(f"--at: {count} combinations; give at most {MOST_NUMBERS} a call.")
+    return np.array(list(product(*(given[name] for name in trained.names))))
+
+
+def _times(options, trained: TrainedModel) -> np.ndarray | None:
+    """Whole snapshot intervals to the end that is asked for."""
+    if options.t_end is None:
+        return None
+    count = max(1, round(options.t_end / trained.interval))
+    nearest = count * trained.interval
+    if abs(nearest - options.t_end) > 1e-6 * nearest:
+        raise ValueError(
+            f"t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
+            f"{trained.interval:g} s; the nearest is {nearest:g} s."
+        )
+    return trained.interval * np.arange(count + 1)
+
+
+def _check(options, trained: TrainedModel, points, times) -> None:
+    """A ValueError for what asks too much."""
+    count, snapshots = len(points), trained.snapshots if times is None else len(times) - 1
+    size = count * (snapshots + 1) * trained.flow.basis.size * points.itemsize
     if size > _MOST_BYTES:
         raise ValueError(
-            f"--reynolds: {count} of them over {snapshots} snapshots make {size / 2**30:.3g} GiB; "
+            f"--at: {count} members over {snapshots} snapshots make {size / 2**30:.3g} GiB; "
             "give fewer or an earlier --t-end."
         )
     for name in ("fields", "tracers"):
         if getattr(options, name) and count > _MOST_FILES:
             raise ValueError(
-                f"--{name}: writes a file for each of {count} Reynolds numbers; give at most "
-                f"{_MOST_FILES}, or make fields of prediction.h5 by `TrainedFlow.fields`."
+                f"--{name}: writes a file for each of {count} members; give at most "
+                f"{_MOST_FILES}, or make fields by `Prediction.fields`."
             )
 
 
-def _warn(trained: TrainedFlow, reynolds: np.ndarray, snapshots: int) -> None:
-    """A line each on stderr for what no training run has seen."""
-    low, high = trained.reynolds[[0, -1]]
-    outside = int(((reynolds < low * (1 - 1e-6)) | (reynolds > high * (1 + 1e-6))).sum())
-    if outside:
-        print(f"jaxsph-rom: warning: {outside} of {len(reynolds)} Reynolds numbers are outside "
+def _warn(trained: TrainedModel, prediction: Prediction) -> None:
+    """A line each on stderr for what no training run has seen, and for what is not the family's."""
+    beyond = trained.predicted_beyond(prediction)
+    for name, count in beyond.items():
+        low, high = trained.range[name]
+        print(f"jaxsph-rom: warning: {count} of {len(prediction)} {_title(name)} are outside "
               f"those trained on, {low:g} to {high:g}.", file=sys.stderr)  # fmt: skip
-    if snapshots > trained.snapshots:
-        print(f"jaxsph-rom: warning: t = {snapshots * trained.interval:g} s is beyond the training "
+    if prediction.time[-1] > trained.end_time * (1.0 + 1e-6):
+        print(f"jaxsph-rom: warning: t = {prediction.time[-1]:g} s is beyond the training "
               f"runs, which end at {trained.end_time:g} s.", file=sys.stderr)  # fmt: skip
+    if prediction.operators == "interpolated":
+        print("jaxsph-rom: warning: the operators at these parameters are interpolated between "
+              "the training runs.", file=sys.stderr)  # fmt: skip
 
 
-def _write_members(options, trained: TrainedFlow, prediction: Prediction, folder: Path) -> str:
+def _title(name: str) -> str:
+    return "Reynolds numbers" if name == "reynolds" else f"values of {name}"
+
+
+def _said(prediction: Prediction, member: int) -> str:
+    return said(dict(zip(prediction.names, map(float, prediction.points[member]), strict=True)))
+
+
+def _names(prediction: Prediction) -> list[str]:
+    """Files of the members."""
+    if prediction.names == ("reynolds",):
+        return [f"re-{number:.12g}.h5" for number in prediction.points[:, 0]]
+    return [f"member-{k:03d}.h5" for k in range(len(prediction))]
+
+
+def _write_members(options, trained: TrainedModel, prediction: Prediction, folder: Path) -> str:
     """Files of single members; what went wrong with tracers, or nothing."""
-    names = [f"re-{number:.12g}.h5" for number in prediction.reynolds]
+    names = _names(prediction)
     for member, name in enumerate(names if options.fields else ()):
         write_fields(folder / "fields" / name, trained, prediction, member)
     if options.tracers is None:
@@ -125,34 +195,38 @@ def _write_members(options, trained: TrainedFlow, prediction: Prediction, folder
     steps = (len(prediction.time) - 1) * trained.steps_per_snapshot
     lost = ""
     for member, name in enumerate(names):
-        number = prediction.reynolds[member]
+        label = f"tracers, {_said(prediction, member)}"
         try:
-            with bar(f"tracers, Re {number:g}", steps) as report:
+            with bar(label, steps) as report:
                 target = folder / "tracers" / name
                 write_tracers(target, trained, prediction, member, points[np.sort(drawn)], report)
         except SimulationError as error:
-            lost = lost or f"tracers, Re {number:g}: {error}"
+            lost = lost or f"{label}: {error}"
     return lost
 
 
-def _results(options, trained: TrainedFlow, prediction: Prediction, path: Path) -> dict[str, Any]:
+def _results(options, trained: TrainedModel, prediction: Prediction, path: Path) -> dict[str, Any]:
     lost = np.flatnonzero(prediction.status)
     return {
         "model": options.model,
         "scene": trained.scene,
         "modes": trained.flow.basis.size,
         "training": trained.training,
-        "reynolds_numbers": len(prediction.reynolds),
-        "reynolds_lowest": prediction.reynolds.min(),
-        "reynolds_highest": prediction.reynolds.max(),
+        "members": len(prediction),
+        "lowest": dict(zip(prediction.names, prediction.points.min(axis=0), strict=True)),
+        "highest": dict(zip(prediction.names, prediction.points.max(axis=0), strict=True)),
+        "outside": int(prediction.outside.sum()),
+        "start": prediction.start,
+        "operators": prediction.operators,
+        "error_indicator_percent": _percent(prediction),
         "end_time": prediction.time[-1],
         "steps": (len(prediction.time) - 1) * trained.steps_per_snapshot,
         "run_seconds": prediction.run_seconds,
         "compile_seconds": prediction.compile_seconds,
-        "stable": len(prediction.reynolds) - len(lost),
+        "stable": len(prediction) - len(lost),
         "faults": [
             {
-                "reynolds": prediction.reynolds[k],
+                "parameters": {n: v[k] for n, v in prediction.parameters.items()},
                 "step": prediction.step[k],
                 "fault": explanation(prediction.status[k]),
             }
@@ -162,22 +236,40 @@ def _results(options, trained: TrainedFlow, prediction: Prediction, path: Path) 
     }
 
 
-def _print(results: dict[str, Any], trained: TrainedFlow, prediction: Prediction) -> None:
-    count, low, high = (results[f"reynolds_{name}"] for name in ("numbers", "lowest", "highest"))
-    made = trained.training
-    trained_on = " ".join(f"{reynolds:g}" for reynolds in trained.reynolds)
-    print_rows({
-        "model": f"{results['scene']}, M = {results['modes']}, closure {made['closure']}",
-        "trained on": f"Re {trained_on}, to t = {trained.end_time:g} s",
-        "Reynolds numbers": f"{count}, {low:g} to {high:g}" if count > 1 else f"{low:g}",
+def _percent(prediction: Prediction) -> dict[str, float] | None:
+    """Median and largest expected error of members that are not lost."""
+    found = 100.0 * prediction.error_indicator[np.isfinite(prediction.error_indicator)]
+    if not len(found):
+        return None
+    return {"median": float(np.median(found)), "largest": float(found.max())}
+
+
+def _print(results: dict[str, Any], trained: TrainedModel, prediction: Prediction) -> None:
+    count, made, expected = len(prediction), trained.training, results["error_indicator_percent"]
+    rows = {
+        "model": f"{results['scene']}, M = {results['modes']}, {made['reduction']}, closure "
+        f"{made['closure']}",
+        "trained on": "; ".join(said(named) for named in reversed(made["trained_on"]))
+        + f", to t = {trained.end_time:g} s",
+    }
+    for name, values in prediction.parameters.items():
+        title = "Reynolds numbers" if name == "reynolds" else name
+        low, high, some = values.min(), values.max(), len(np.unique(values))
+        rows[title] = f"{some}, {low:g} to {high:g}" if some > 1 else f"{low:g}"
+    rows |= {
         "steps": f"{results['steps']}, to t = {results['end_time']:g} s",
+        "start": results["start"],
         "run": f"{results['run_seconds']:.3g} s",
         "compile": f"{results['compile_seconds']:.3g} s",
         "stable": f"{results['stable']} of {count}",
+        "outside": f"{results['outside']} of {count}",
+        "expected error": "unknown" if expected is None else f"{expected['median']:.2g} % of "
+        f"velocity in the median, {expected['largest']:.2g} % at most",
         "prediction": str(results["prediction"]),
-    })  # fmt: skip
+    }
+    print_rows(rows)
     for fault in results["faults"][:_FAULTS_SHOWN]:
-        print(f"  Re {fault['reynolds']:g}, step {fault['step']}: {fault['fault']}")
+        print(f"  {said(fault['parameters'])}, step {fault['step']}: {fault['fault']}")
     if len(results["faults"]) > _FAULTS_SHOWN:
         print("  and more; prediction.h5 tells the status of each")
     print_errors(made)

@@ -15,6 +15,8 @@ from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
 from ..field_advection import ConsistentAdvection, PaperAdvection
+from ..hyper import Family
+from ..hyper.training import check_family
 from ..lattice_polynomials import LatticePolynomials
 from ..projection import (
     AdjointPetrovGalerkin,
@@ -117,8 +119,8 @@ def _run(options) -> int:
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         experiments = plan.experiments()
-        study = _study(options, plan, folder)
-        models = list(_models(options, study))
+        study, family = _study(options, plan, folder)
+        models = list(_models(options, study, family))
         outcomes: list[Outcome] = []
         try:
             for experiment in experiments:
@@ -139,7 +141,7 @@ def _run(options) -> int:
     return 0
 
 
-def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
+def _models(options, study: Study, family: Family) -> Iterator[Study | TensorStudy]:
     """What runs reduced models: on moving particles, on reference points."""
     closed = options.closure == "linear"
     if closed and "tensor" not in options.hyper:
@@ -148,7 +150,7 @@ def _models(options, study: Study) -> Iterator[Study | TensorStudy]:
     if "none" in options.hyper:
         yield study
     if "tensor" in options.hyper:
-        yield TensorStudy(study, formulation(options), closed, options.held_back)
+        yield TensorStudy(study, formulation(options), closed, options.held_back, family)
 
 
 def _plan(options) -> Plan:
@@ -165,7 +167,7 @@ def _plan(options) -> Plan:
     return planned(options, ("train", "predict", "modes"), given)
 
 
-def _study(options, plan: Plan, folder: Path) -> Study:
+def _study(options, plan: Plan, folder: Path) -> tuple[Study, Family]:
     reynolds = (*plan.train, *plan.predict)
     memory = plan.tau if options.tau is None else options.tau
     if not isinstance(memory, MemoryLength):
@@ -176,10 +178,14 @@ def _study(options, plan: Plan, folder: Path) -> Study:
     def check(scene: Scene) -> None:
         interpolation.check(scene.state.position, scene.space, options.spline_order)
 
-    return Study(
-        scene_maker(
-            options, plan, reynolds, folder, on_points="tensor" in options.hyper, check=check
-        ),
+    def trained(family: Family) -> None:
+        for experiment in plan.experiments() if on_points else ():
+            check_family(family, [{"reynolds": re} for re in experiment.trained_on])
+
+    on_points = "tensor" in options.hyper
+    family = scene_maker(options, plan, reynolds, folder, on_points, check, trained)
+    study = Study(
+        family.make,
         folder,
         projections=tuple(projections[name] for name in distinct(options.projection)),
         product=PRODUCTS[options.inner_product](),
@@ -191,3 +197,4 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         probes=plan.probes,
         judged_from=plan.judged_from,
     )
+    return study, family

@@ -16,8 +16,17 @@ from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
-from ..hyper import LinearClosure, TrainedFlow, formulation_for, save_flow, train_flows
-from ..hyper.training import held_back
+from ..hyper import (
+    Family,
+    LinearClosure,
+    Samples,
+    Tensors,
+    TrainedModel,
+    formulation_for,
+    train_each,
+)
+from ..hyper.linear_closure import held_back
+from ..hyper.training import check_family
 from ..report.plain import plain
 from ..study import Plan, full_run
 from .options import (
@@ -30,8 +39,11 @@ from .options import (
     distinct,
     formulation,
     planned,
+    said,
     scene_maker,
 )
+
+REDUCTIONS = {"tensors": Tensors(), "samples": Samples()}
 
 
 def add_to(commands) -> None:
@@ -48,6 +60,9 @@ def add_to(commands) -> None:
     add_training_options(add)
     add("--modes", type=positive_int, default=10, metavar="M",
         help="number of modes (default: %(default)s)")  # fmt: skip
+    add("--reduction", choices=tuple(REDUCTIONS), default="tensors",
+        help="constant tensors, or rates as they are at a few points, for forces that change with "
+        "time (default: %(default)s)")  # fmt: skip
     add_closure_options(add, default="linear")
     add("--closure-iterations", type=positive_int, default=600, metavar="K",
         help="of the closure's training (default: %(default)s)")  # fmt: skip
@@ -67,25 +82,35 @@ def _train(options) -> int:
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         check_closure(options)
-        closure = _closure(options, plan.train)
-        scenes = _scenes(options, plan, folder)
+        reduction = REDUCTIONS[options.reduction]
+        parameters = [{"reynolds": number} for number in sorted(plan.train, reverse=True)]
+        closure = _closure(options, parameters)
+
+        def check(family: Family) -> None:
+            check_family(family, parameters, (options.modes,), closure, reduction)
+
         try:
+            family = scene_maker(options, plan, plan.train, folder, True, trained=check)
+            scenes = [family.scene(named) for named in parameters]
             runs = [full_run(folder / "full", scene, bar) for scene in scenes]
+            made_as = formulation(options)
+            if made_as is None:
+                product = PRODUCTS[options.inner_product]()
+                made_as = formulation_for(scenes[0], product, closed=closure is not None)
+            (trained,) = train_each(
+                family, parameters, (options.modes,), runs=runs, closure=closure,
+                formulation=made_as, reduction=reduction, progress=bar,
+            )  # fmt: skip
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
-        made_as = formulation(options)
-        if made_as is None:
-            product = PRODUCTS[options.inner_product]()
-            made_as = formulation_for(scenes[0], product, closed=closure is not None)
-        (trained,) = train_flows(scenes, runs, (options.modes,), made_as, closure, bar)
         trained = dataclasses.replace(
             trained,
             training=trained.training
             | {"inner_product": options.inner_product, "full_seconds": _seconds(scenes, runs)},
         )
-        save_flow(path, trained)
+        trained.save(path)
     if options.json is not None:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         results = plain(_results(trained, path))
@@ -101,28 +126,18 @@ def _plan(options) -> Plan:
     return planned(options, ("train",), given)
 
 
-def _scenes(options, plan: Plan, folder: Path) -> list[Scene]:
-    """The training scenes; a ValueError for what would fail after the full runs."""
-    make = scene_maker(options, plan, plan.train, folder, on_points=True)
-    scenes = [make(reynolds) for reynolds in plan.train]
-    available = sum(scene.steps // scene.steps_per_snapshot + 1 for scene in scenes)
-    if options.modes > available:
-        raise ValueError(
-            f"modes: {options.modes} asked for, but the training runs give {available} snapshots; "
-            "ask for fewer modes, a longer run or more training runs."
-        )
-    return scenes
-
-
-def _closure(options, reynolds) -> LinearClosure | None:
+def _closure(options, parameters) -> LinearClosure | None:
     if options.closure == "none":
         return None
-    judge = held_back(reynolds) if options.held_back is None else options.held_back
-    if options.held_back is not None and (judge not in reynolds or len(reynolds) < 2):
-        raise ValueError(
-            f"--held-back: Re {judge:g} must be one of at least two training Reynolds numbers, "
-            f"which are {', '.join(f'{re:g}' for re in reynolds)}."
-        )
+    judge = held_back(parameters)
+    if options.held_back is not None:
+        judge = {"reynolds": options.held_back}
+        if judge not in parameters or len(parameters) < 2:
+            known = ", ".join(f"{named['reynolds']:g}" for named in reversed(parameters))
+            raise ValueError(
+                f"--held-back: Re {options.held_back:g} must be one of at least two training "
+                f"Reynolds numbers, which are {known}."
+            )
     return LinearClosure(judge, iterations=options.closure_iterations)
 
 
@@ -134,7 +149,7 @@ def _seconds(scenes: list[Scene], runs: list[Trajectory]) -> float:
     )
 
 
-def _results(trained: TrainedFlow, path: Path) -> dict[str, Any]:
+def _results(trained: TrainedModel, path: Path) -> dict[str, Any]:
     return {
         "scene": trained.scene,
         "parameters": trained.parameters,
@@ -145,16 +160,16 @@ def _results(trained: TrainedFlow, path: Path) -> dict[str, Any]:
     }
 
 
-def _print(trained: TrainedFlow, particles: int, path: Path) -> None:
+def _print(trained: TrainedModel, particles: int, path: Path) -> None:
     made = trained.training
     closure = made["closure"]
     if closure != "none":
         judge = made["held_back"]
         closure += f", {made['closure_seconds']:.3g} s"
-        closure += "" if judge is None else f", Re {judge:g} held back"
+        closure += "" if judge is None else f", {said(judge)} held back"
     print_rows({
         "scene": f"{trained.scene}, {particles} particles, to t = {trained.end_time:g} s",
-        "trained on": "Re " + " ".join(f"{reynolds:g}" for reynolds in trained.reynolds),
+        "trained on": "; ".join(said(named) for named in reversed(made["trained_on"])),
         "modes": f"{trained.flow.basis.size}, {made['inner_product']} inner product, "
         f"{made['formulation']}",
         "full runs": f"{made['full_seconds']:.3g} s",
@@ -169,14 +184,14 @@ def print_errors(training: dict[str, Any]) -> None:
     """What a model gets wrong on the runs that it was trained on."""
     print("\npercent discrepancy over the reference points on the training runs, peak and median\n"
           "over time (in brackets that of the projection, the floor of any model):")  # fmt: skip
-    for number, error in training["errors"].items():
+    for row in reversed(training["runs"]):
+        error, floor = row["errors"], row["floor"]
         if isinstance(error, str):
-            print(f"  Re {number}: {error}")
+            print(f"  {said(row['parameters'])}: {error}")
             continue
-        floor = training["floor"][number]
         cells = [
             f"{name} {error[f'{name}_peak_percent']:.3g} ({floor[f'{name}_peak_percent']:.3g}), "
             f"{error[f'{name}_median_percent']:.3g} ({floor[f'{name}_median_percent']:.3g})"
             for name in ("velocity", "pressure")
         ]
-        print(f"  Re {number}: {'; '.join(cells)}")
+        print(f"  {said(row['parameters'])}: {'; '.join(cells)}")

@@ -13,8 +13,8 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxsph.integrate.diffrax_term import ode_term
 
-from .quadratic_system import QuadraticSystem
-from .tensor_model import TensorModel
+from .dynamics import Dynamics
+from .points_model import PointsModel
 
 
 class SolverError(RuntimeError):
@@ -63,9 +63,9 @@ class AdaptiveRun(eqx.Module):
 
 
 def solve(
-    system: QuadraticSystem,
+    dynamics: Dynamics,
     coordinates: Float[Array, " modes"],
-    viscosity: Float[Array, ""],
+    values: Float[Array, "*coefficients"],
     times: Float[Array, " times"],
     *,
     solver: diffrax.AbstractSolver | None = None,
@@ -74,15 +74,15 @@ def solve(
     first_step: float | None = None,
     max_steps: int = 4096,
 ) -> AdaptiveRun:
-    """Coordinates of da/dt = f(a, nu) at given times, by a solver that chooses its own steps.
+    """Coordinates of da/dt = f(t, a; theta) at given times, by a solver that chooses its own steps.
 
-    Pure: jit and vmap it over viscosities (all runs then take as many turns as the longest), and
+    Pure: jit and vmap it over coefficients (all runs then take as many turns as the longest), and
     differentiate it. Snapshots are interpolated between steps and do not shorten them.
 
     Args:
-        system: of the coordinates.
+        dynamics: of the coordinates.
         coordinates: at time 0.
-        viscosity: nu [m^2/s].
+        values: theta, a viscosity say.
         times: increasing, from 0 on [s].
         solver: `diffrax.Tsit5()` if none is given (explicit, fifth order); `diffrax.Kvaerno5()` is
             implicit, for steps beyond the stability limit of sound.
@@ -108,7 +108,7 @@ def solve(
         scale = jax.lax.stop_gradient(jnp.linalg.norm(coordinates))
         controller = diffrax.PIDController(rtol=1e-6, atol=1e-6 * scale)
     times = jnp.asarray(times, coordinates.dtype)
-    model = TensorModel(system, jnp.asarray(viscosity, coordinates.dtype))
+    model = PointsModel(dynamics, jnp.asarray(values, coordinates.dtype))
     # third-party code counts on the usual promotion
     with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         found = diffrax.diffeqsolve(

@@ -1,11 +1,10 @@
-"""A linear closure of the quadratic system, learnt through its trajectories."""
+"""A linear closure of reduced dynamics, learnt through their trajectories."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxsph.integrate import rk4_step
 
-from .quadratic_system import QuadraticSystem
+from .dynamics import Dynamics
 
 _REPORTS = 20  # of progress in a training
 
@@ -24,11 +23,11 @@ class ProjectedRun(NamedTuple):
     """A full run in reduced coordinates: what a closure learns from.
 
     Args:
-        viscosity: nu [m^2/s].
-        coordinates: of its snapshots, at even intervals (S, M).
+        values: theta of the operators; a viscosity [m^2/s], say.
+        coordinates: of its snapshots, at even intervals from time 0 on (S, M).
     """
 
-    viscosity: float
+    values: float | Float[np.ndarray, " coefficients"]
     coordinates: Float[np.ndarray, "snapshots modes"]
 
 
@@ -40,35 +39,38 @@ class FittedClosure(NamedTuple):
         training, validation: loss at each report; validation is None without a held-back run.
     """
 
-    system: QuadraticSystem
+    system: Dynamics
     training: list[float]
     validation: list[float] | None
 
 
 def rollout(
-    system: QuadraticSystem,
+    system: Dynamics,
     coordinates: Float[Array, " modes"],
-    viscosity: Float[Array, ""],
+    values: Float[Array, "*coefficients"],
     time_step: float,
     steps_per_snapshot: int,
     snapshots: int,
+    first: Float[Array, ""] | float = 0.0,
 ) -> Float[Array, "snapshots modes"]:
-    """Coordinates after each interval, by RK4; pure, and differentiable in all arrays."""
+    """Coordinates after each interval from time `first` [s] on, by RK4; pure, and differentiable in
+    all arrays."""
 
-    start = jnp.zeros((), coordinates.dtype)  # the system does not depend on time
+    def step(carry, _):
+        time, a = carry
+        a = rk4_step(lambda t, a: system.rates(t, a, values), time, a, time_step)
+        return (time + time_step, a), None
 
-    def step(a, _):
-        return rk4_step(lambda _, a: system(a, viscosity), start, a, time_step), None
+    def interval(carry, _):
+        carry, _ = lax.scan(step, carry, None, length=steps_per_snapshot)
+        return carry, carry[1]
 
-    def interval(a, _):
-        a, _ = lax.scan(step, a, None, length=steps_per_snapshot)
-        return a, a
-
-    return lax.scan(interval, coordinates, None, length=snapshots)[1]
+    start = jnp.asarray(first, coordinates.dtype)
+    return lax.scan(interval, (start, coordinates), None, length=snapshots)[1]
 
 
 def fit_linear_closure(
-    system: QuadraticSystem,
+    system: Dynamics,
     runs: Sequence[ProjectedRun],
     time_step: float,
     steps_per_snapshot: int,
@@ -80,16 +82,17 @@ def fit_linear_closure(
     regularisation: float = 1e-8,
     progress: Callable[[int], None] | None = None,
 ) -> FittedClosure:
-    """The system with a linear correction, explicit in the viscosity:
+    """The system with a linear correction, explicit in its coefficients:
 
-        da/dt = f(a, nu) + (A + nu / nu_m A') a,
+        da/dt = f(a; theta) + (A + sum_k theta_k / s_k A_k) a,
 
     trained by Adam with a cosine decay on the loss
 
-        sum |a - a_run|^2 / sum |a_run|^2 + regularisation (|A|^2 + |A'|^2)
+        sum |a - a_run|^2 / sum |a_run|^2 + regularisation (|A|^2 + sum |A_k|^2)
 
     over windows of each run that overlap by half, every window starting from the run's own
-    coordinates. In the energy product the loss is an energy. nu_m is the runs' mean viscosity.
+    coordinates. In the energy product the loss is an energy. s_k is the runs' mean |theta_k|, the
+    mean viscosity, say.
 
     Args:
         system: as projected.
@@ -108,26 +111,30 @@ def fit_linear_closure(
             than the window; if the training diverges.
     """
     _check(system, runs if held_back is None else [*runs, held_back], window)
-    mean = float(np.mean([run.viscosity for run in runs]))
-    starts, wanted, viscosities = _windows(runs, window)
-    dtype = system.linear.dtype
+    interval = time_step * steps_per_snapshot
+    mean = np.mean([np.abs(np.atleast_1d(run.values)) for run in runs], axis=0)
+    examples = _windows(runs, window, interval)
+    wanted = examples[1]
+    dtype = wanted.dtype
+    scale = jnp.asarray(np.where(mean > 0.0, mean, 1.0), dtype)[:, None, None]
     size = jnp.mean(wanted**2)
 
     def closed(correction):
-        change = jnp.stack([correction[0], correction[1] / mean])
-        return eqx.tree_at(lambda s: s.linear, system, system.linear + change)
+        return system.plus(correction[0], correction[1:] / scale)
 
-    def error(correction, starts, wanted, viscosities):
-        def one(start, viscosity):
+    def error(correction, starts, wanted, values, times):
+        model = closed(correction)
+
+        def one(start, values, time):
             return rollout(
-                closed(correction), start, viscosity, time_step, steps_per_snapshot, wanted.shape[1]
+                model, start, values, time_step, steps_per_snapshot, wanted.shape[1], time
             )
 
-        return jnp.mean((jax.vmap(one)(starts, viscosities) - wanted) ** 2)
+        return jnp.mean((jax.vmap(one)(starts, values, times) - wanted) ** 2)
 
     def loss(correction):
         own = regularisation * jnp.sum(correction**2)
-        return error(correction, starts, wanted, viscosities) / size + own
+        return error(correction, *examples) / size + own
 
     optimiser = optax.adam(optax.cosine_decay_schedule(learning_rate, iterations))
 
@@ -145,11 +152,11 @@ def fit_linear_closure(
 
     @jax.jit
     def judge(correction):
-        alone = _windows([held_back], len(held_back.coordinates) - 1)
+        alone = _windows([held_back], len(held_back.coordinates) - 1, interval)
         return error(correction, *alone) / jnp.mean(alone[1] ** 2)
 
     every = max(1, iterations // _REPORTS)
-    correction = jnp.zeros((2, system.size, system.size), dtype)
+    correction = jnp.zeros((1 + len(mean), system.size, system.size), dtype)
     state = optimiser.init(correction)
     best, training, validation = correction, [], []
     for _ in range(-(-iterations // every)):
@@ -170,19 +177,23 @@ def fit_linear_closure(
     return FittedClosure(closed(best), training, validation)
 
 
-def _windows(runs: Sequence[ProjectedRun], window: int) -> tuple[Array, Array, Array]:
-    """First coordinates, those that follow, and viscosity of every window."""
-    starts, wanted, viscosities = [], [], []
+def _windows(
+    runs: Sequence[ProjectedRun], window: int, interval: float
+) -> tuple[Array, Array, Array, Array]:
+    """First coordinates, those that follow, coefficients and first time of every window."""
+    starts, wanted, values, times = [], [], [], []
     for run in runs:
         last = len(run.coordinates) - 1 - window
         for first in sorted({*range(0, last + 1, max(1, window // 2)), last}):
             starts.append(run.coordinates[first])
             wanted.append(run.coordinates[first + 1 : first + 1 + window])
-            viscosities.append(run.viscosity)
-    return jnp.asarray(np.stack(starts)), jnp.asarray(np.stack(wanted)), jnp.asarray(viscosities)
+            values.append(np.atleast_1d(run.values))
+            times.append(first * interval)
+    stacked = (np.stack(starts), np.stack(wanted), np.stack(values), np.asarray(times))
+    return tuple(jnp.asarray(part, stacked[0].dtype) for part in stacked)
 
 
-def _check(system: QuadraticSystem, runs: Sequence[ProjectedRun], window: int) -> None:
+def _check(system: Dynamics, runs: Sequence[ProjectedRun], window: int) -> None:
     if not runs:
         raise ValueError("runs: a closure needs at least one run to learn from.")
     for run in runs:

@@ -10,26 +10,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from jaxsph import (
-    NeighborSearch,
-    ParticleState,
-    SPHFunctional,
-    VerletList,
-    WalledSearch,
-    WallList,
-)
+from jaxsph import ParticleState, SPHFunctional, VerletList, WallList
 from jaxsph.scenes import Scene
 
 from ..field_advection import FieldAdvection
-from ..still_walls import check_still
 from .cloud import Cloud
-from .fixed_points import kept_effects, with_effects, with_viscosity
+from .coefficients import Coefficients
+from .fixed_points import neighbors_at, on_points, with_effects
 from .log_density import from_log_density
-from .reference_operators import neighbors_of
 
 
 class EulerianRates(eqx.Module):
-    """f-bar(w, t; nu) of w = (r, u) at fixed points x_G, r the logarithmic density:
+    """f-bar(w, t; theta) of w = (r, u) at fixed points x_G, r the logarithmic density:
 
         du/dt = f_u - u . grad u,    dr/dt = (rho0 / rho) (f_rho - u . grad rho),
 
@@ -39,50 +31,69 @@ class EulerianRates(eqx.Module):
     Args:
         functional: effects that act on fixed points, and `FieldAdvection`.
         points: x_G (G, n) [m].
-        neighbors: list of the points.
+        neighbors: list of the points; none where rates are only taken `around` some of them.
+        coefficients: what of the functional is left open: theta (K,).
     """
 
     functional: SPHFunctional
     points: Float[Array, "points dim"]
-    neighbors: VerletList | WallList
+    neighbors: VerletList | WallList | None
+    coefficients: Coefficients
 
     @classmethod
-    def of_scene(cls, scene: Scene, points: Float[Array, "points dim"]) -> EulerianRates:
-        """Rates of a scene; its viscosity is a parameter of the call.
+    def of_scene(
+        cls,
+        scene: Scene,
+        points: Float[Array, "points dim"],
+        coefficients: Coefficients | None = None,
+    ) -> EulerianRates:
+        """Rates of a scene.
+
+        Args:
+            scene: whose effects and walls act.
+            points: x_G (G, n) [m].
+            coefficients: left open; the scene's viscosity if none are given.
 
         Raises:
-            ValueError: if the box is too small for the kernel's support, or bodies are moved
-                through the fluid.
+            ValueError: if the box is too small for the kernel's support, bodies are moved through
+                the fluid, or an effect has no meaning on fixed points.
         """
-        check_still(scene)
-        effects = (*kept_effects(scene.effects), FieldAdvection())
-        functional = with_effects(scene.functional(), effects)
-        return cls._of(functional, jnp.asarray(points, scene.state.position.dtype))
+        functional = on_points(scene)
+        if coefficients is None:
+            coefficients = Coefficients.named(functional, "viscosity")
+        return cls.of(functional, points, coefficients)
 
     @classmethod
-    def _of(cls, functional: SPHFunctional, points) -> EulerianRates:
-        space, walls = functional.space, functional.walls
-        box, support = space.box, space.support
-        # fixed points need neither a skin nor a margin
-        if walls is None:
-            search = NeighborSearch.allocate(points, box, support, 0.0, 1.0)
-        else:
-            search = WalledSearch.allocate(
-                points, walls.position, box, support, 0.0, space.spacing, 1.0
-            )
-        return cls(functional, points, neighbors_of(search, points))
+    def of(
+        cls,
+        functional: SPHFunctional,
+        points: Float[Array, "points dim"],
+        coefficients: Coefficients,
+        listed: bool = True,
+    ) -> EulerianRates:
+        """Rates by a functional of fixed points (`on_points`), with a list of these or without."""
+        functional = with_effects(functional, (*functional.effects, FieldAdvection()))
+        points = jnp.asarray(points, functional.mass.dtype)
+        if listed:
+            return cls._of(functional, points, coefficients)
+        return cls(functional, points, None, coefficients)
+
+    @classmethod
+    def _of(cls, functional: SPHFunctional, points, coefficients) -> EulerianRates:
+        return cls(functional, points, neighbors_at(functional, points), coefficients)
 
     def __call__(
         self,
         time: Float[Array, ""],
         fields: Float[Array, "points fields"],
-        viscosity: Float[Array, ""],
+        values: Float[Array, " coefficients"],
     ) -> Float[Array, "points fields"]:
         """Rates of (r, u)."""
-        fluid = self.functional.fluid
+        functional = self.coefficients.applied(self.functional, values)
+        fluid = functional.fluid
         density = from_log_density(fields[:, 0], fluid)
         state = ParticleState(self.points, fields[:, 1:], density)
-        found = with_viscosity(self.functional, viscosity)(time, state, self.neighbors)
+        found = functional(time, state, self.neighbors)
         log_rate = fluid.reference_density / density * found.density
         return jnp.concatenate([log_rate[:, None], found.velocity], axis=1)
 
@@ -111,6 +122,7 @@ class EulerianRates(eqx.Module):
         if samples.min() < 0 or samples.max() >= count:
             raise ValueError(f"samples: numbers from 0 to {count - 1}, got {samples.max()}.")
         functional, effects = self.functional, self.functional.effects
+        coefficients = self.coefficients
         space, walls = functional.space, functional.walls
         reach = space.support * (1.0 + 1e-9)
         points = Cloud(np.asarray(self.points), space.box)
@@ -125,5 +137,6 @@ class EulerianRates(eqx.Module):
             members = np.union1d(members, points.around(ghosts.positions[seen], reach))
             walls = jax.tree.map(lambda a: a[seen], walls) if len(seen) else None
             functional = eqx.tree_at(lambda f: f.walls, functional, walls)
+            coefficients = coefficients.at_ghosts(seen)
         members = np.concatenate([samples, np.setdiff1d(members, samples)])
-        return self._of(functional, self.points[members]), members
+        return self._of(functional, self.points[members], coefficients), members

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import final
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -17,6 +18,7 @@ from jaxsph.scenes import Scene
 from ..basis import Basis, Centring, Energy, InnerProduct, pod
 from ..reference import ReferenceSpace
 from .closure import ProjectedRun
+from .fixed_points import on_points
 from .recovery import fit_recovery
 from .reduced_flow import ReducedFlow
 from .reference_operators import ReferenceOperators
@@ -37,10 +39,10 @@ class Formulation(abc.ABC):
         """As users type it."""
 
     @abc.abstractmethod
-    def flow(
+    def basis(
         self, scene: Scene, reference: ReferenceSpace, mapped: Sequence[np.ndarray], modes: int
-    ) -> ReducedFlow:
-        """The flow of some modes; it can be truncated."""
+    ) -> Basis:
+        """Modes of (r, u); the first of them are those of fewer modes."""
 
     @abc.abstractmethod
     def finished(
@@ -72,10 +74,9 @@ class Compressible(Formulation):
     def name(self):
         return "compressible"
 
-    def flow(self, scene, reference, mapped, modes):
+    def basis(self, scene, reference, mapped, modes):
         snapshots = np.concatenate(mapped, axis=-1)
-        basis = self.decompose(snapshots, self.product, scene.fluid, modes, self.centring)
-        return ReducedFlow.of_basis(scene, reference, basis)
+        return self.decompose(snapshots, self.product, scene.fluid, modes, self.centring)
 
     def finished(self, flow, scene, projected, mapped):
         return flow
@@ -104,10 +105,9 @@ class Solenoidal(Formulation):
     def name(self):
         return "solenoidal"
 
-    def flow(self, scene, reference, mapped, modes):
-        operators = ReferenceOperators.of_scene(scene, reference.points)
-        basis = solenoidal_basis(np.concatenate(mapped, axis=-1), operators, modes)
-        return ReducedFlow.of_basis(scene, reference, basis)
+    def basis(self, scene, reference, mapped, modes):
+        operators = ReferenceOperators.of(on_points(scene), reference.points)
+        return solenoidal_basis(np.concatenate(mapped, axis=-1), operators, modes)
 
     def finished(self, flow, scene, projected, mapped):
         interval = scene.time_step * scene.steps_per_snapshot
@@ -139,6 +139,6 @@ def _predicted(
     start, count = run.coordinates[:1], len(run.coordinates) - 1
     steps = scene.time_step, scene.steps_per_snapshot, count
     try:
-        return np.concatenate([start, flow.predict(start[0], run.viscosity, *steps)])
+        return np.concatenate([start, flow.predict(jnp.asarray(start[0]), run.values, *steps)])
     except SimulationError:
         return run.coordinates

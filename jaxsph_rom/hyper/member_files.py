@@ -13,16 +13,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxsph import ParticleState, Trajectory, simulate
-from jaxsph.arrangements import Lattice
 from jaxsph.io import TrajectoryWriter
-from jaxsph.scenes import SCENES
-from jaxsph.scenes.record import scene_from_record
 from jaxsph.trajectory import Snapshot
-from jaxsph.walls import Walls
 
 from .prediction import Prediction
 from .tracer_model import TracerModel, TracerState
-from .trained_flow import TrainedFlow
+from .trained_model import TrainedModel
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ class _Recorded:
 
 
 def write_fields(
-    path: str | os.PathLike, trained: TrainedFlow, prediction: Prediction, member: int
+    path: str | os.PathLike, trained: TrainedModel, prediction: Prediction, member: int
 ) -> None:
     """Write a member's fields at the reference points, as far as it is good."""
     fields = trained.fields(prediction, member)
@@ -57,7 +53,7 @@ def write_fields(
 
 def write_tracers(
     path: str | os.PathLike,
-    trained: TrainedFlow,
+    trained: TrainedModel,
     prediction: Prediction,
     member: int,
     positions: Float[np.ndarray, "particles dim"],
@@ -68,9 +64,10 @@ def write_tracers(
     Raises:
         SimulationError: on a fault; the file then holds the good snapshots.
     """
-    dtype = trained.flow.system.linear.dtype
-    viscosity = trained.speed_times_length / prediction.reynolds[member]
-    model = TracerModel.of(trained.flow, jnp.asarray(viscosity, dtype), _walls(trained))
+    dtype = trained.flow.reference.points.dtype
+    values = jnp.asarray(prediction.values[member], dtype)
+    model = TracerModel.of(trained.flow, values, trained.functional.walls)
+    model = eqx.tree_at(lambda m: m.fluid, model, trained.fluid(values))
     start = TracerState(
         jnp.asarray(prediction.coordinates[member, 0], dtype), jnp.asarray(positions, dtype)
     )
@@ -94,19 +91,14 @@ def write_tracers(
 def _created(path, trained, prediction, member, state) -> TrajectoryWriter:
     parameters = {
         **trained.parameters,
-        "reynolds": float(prediction.reynolds[member]),
+        **{name: float(values[member]) for name, values in prediction.parameters.items()},
         "end_time": float(prediction.time[-1]),
         "reduced": {"modes": trained.flow.basis.size, **trained.training},
+        "outside": bool(prediction.outside[member]),
+        "error_indicator": float(prediction.error_indicator[member]),
     }
     steps = (len(prediction.time) - 1) * trained.steps_per_snapshot
     run = _Recorded(
         trained.scene, parameters, trained.time_step, steps, trained.steps_per_snapshot, state
     )
     return TrajectoryWriter.create(path, run, modes=trained.flow.basis.size, overwrite=True)
-
-
-def _walls(trained: TrainedFlow) -> Walls | None:
-    """The walls of the scene; there are none where the box is periodic all round."""
-    if all(trained.flow.reference.space.box.periodic) or trained.scene not in SCENES:
-        return None
-    return scene_from_record(trained.scene, trained.parameters, Lattice()).walls

@@ -1,49 +1,133 @@
-"""Runs of a reduced flow at many Reynolds numbers, and their file."""
+"""Runs of a reduced model at many parameters, and their file."""
 
 from __future__ import annotations
 
+import json
 import os
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxsph import Trajectory
 
 from .whole_file import read_whole, write_whole
 
-KIND = ("jaxsph prediction", 1)
+if TYPE_CHECKING:
+    from .trained_model import TrainedModel
+
+KIND = ("jaxsph prediction", 2)
 _LAYOUT = {
-    "reynolds": ("members", "1"),
+    "points": ("members names", "of each parameter its own"),
+    "values": ("members coefficients", "of each coefficient its own"),
     "time": ("times", "s"),
-    "coordinates": ("members times modes", "as the modes of the reduced flow"),
+    "coordinates": ("members times modes", "as the modes of the reduced model"),
     "status": ("members", "fault code; 0 for a good run"),
     "step": ("members", "of the fault; -1 for a good run"),
+    "outside": ("members", "1 beyond the training points or their time"),
+    "error_indicator": ("members", "1; expected relative error of velocity"),
 }
 
 
-class Prediction(NamedTuple):
-    """A member for each Reynolds number.
+class Maker:
+    """The model that made a prediction: known by its identity, so that it is structure under
+    `jax.jit`.
 
     Args:
-        reynolds: (K,).
-        time: of the snapshots, the start included (S,) [s].
+        model: a trained model.
+    """
+
+    def __init__(self, model: TrainedModel):
+        self.model = model
+
+
+class Prediction(eqx.Module):
+    """A member for each set of parameters.
+
+    Args:
+        names: of the parameters (static).
+        points: a row of them a member (K, n).
+        values: theta of each member's operators.
+        time: of the snapshots (S,) [s].
         coordinates: (K, S, M); NaN from a member's fault on.
         status: a `FaultCode` each, 0 for a good run (K,).
         step: that met the fault, -1 for a good run (K,).
-        run_seconds, compile_seconds: wall-clock time of all members together [s].
+        outside: whether a member is beyond the training points' range in a parameter, or the
+            prediction goes on beyond their time (K,).
+        start: where members start from: `given`; `family`, as `make` has it at these parameters;
+            or `interpolated` between the training runs (static).
+        operators: `family`, as `make` has them, or `interpolated` (static).
+        maker: of it; none in a prediction of a file without its model (static).
+        run_seconds, compile_seconds: wall-clock time of all members together [s] (static).
     """
 
-    reynolds: Float[np.ndarray, " members"]
-    time: Float[np.ndarray, " times"]
-    coordinates: Float[np.ndarray, "members times modes"]
-    status: Int[np.ndarray, " members"]
-    step: Int[np.ndarray, " members"]
-    run_seconds: float
-    compile_seconds: float
+    names: tuple[str, ...] = eqx.field(static=True)
+    points: Float[Array, "members names"]
+    values: Float[Array, "members coefficients"]
+    time: Float[Array, " times"]
+    coordinates: Float[Array, "members times modes"]
+    status: Int[Array, " members"]
+    step: Int[Array, " members"]
+    outside: Bool[Array, " members"]
+    start: str = eqx.field(static=True)
+    operators: str = eqx.field(static=True)
+    maker: Maker | None = eqx.field(static=True, default=None)
+    indicated: Float[Array, " members"] | None = None
+    run_seconds: float = eqx.field(static=True, default=float("nan"))
+    compile_seconds: float = eqx.field(static=True, default=float("nan"))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        what = ", ".join(self.names)
+        count, size = self.coordinates.shape[0], self.coordinates.shape[2]
+        return (
+            f"Prediction({count} members over {what}; {size} modes at {len(self.time)} times; "
+            f"start {self.start})"
+        )
+
+    @property
+    def parameters(self) -> dict[str, Float[Array, " members"]]:
+        """Each parameter over the members."""
+        return {name: self.points[:, k] for k, name in enumerate(self.names)}
+
+    @property
+    def error_indicator(self) -> Float[Array, " members"]:
+        """The expected relative error of each member's velocity, as `Indicator` has it; NaN for a
+        member that is lost. It is evaluated when it is first asked for."""
+        return self._indicated
+
+    @cached_property
+    def _indicated(self):
+        if self.indicated is not None:
+            return self.indicated
+        return self._with_model().indicate(self.values, self.time, self.coordinates)
+
+    def fields(self, member: int = 0, points=None) -> Trajectory:
+        """Fields of a member over time, as far as it is good.
+
+        Args:
+            member: its number.
+            points: (P, n) [m]; the reference points if none are given.
+
+        Raises:
+            ValueError: if the prediction is of a file and has no model.
+        """
+        return self._with_model().fields(self, member, points)
 
     def good(self, member: int) -> int:
         """The number of a member's snapshots before its fault."""
-        lost = np.isnan(self.coordinates[member]).any(axis=-1)
+        lost = np.isnan(np.asarray(self.coordinates[member])).any(axis=-1)
         return int(np.argmax(np.append(lost, True)))
+
+    def _with_model(self) -> TrainedModel:
+        if self.maker is None:
+            raise ValueError("model: the prediction has none; load it with model=... as well.")
+        return self.maker.model
 
 
 def save_prediction(path: str | os.PathLike, prediction: Prediction, source: str) -> None:
@@ -52,25 +136,39 @@ def save_prediction(path: str | os.PathLike, prediction: Prediction, source: str
     Args:
         path: of the file.
         prediction: to write.
-        source: name of the reduced flow's file, for the record.
+        source: name of the model's file, for the record.
 
     Raises:
         TrajectoryFileError: if the file cannot be written.
     """
-    arrays = prediction._asdict()
-    attributes = {name: arrays.pop(name) for name in ("run_seconds", "compile_seconds")}
-    write_whole(path, KIND, _LAYOUT, arrays, {**attributes, "model": source})
+    arrays = {name: np.asarray(getattr(prediction, name)) for name in _LAYOUT}
+    attributes: dict[str, Any] = {
+        name: getattr(prediction, name)
+        for name in ("start", "operators", "run_seconds", "compile_seconds")
+    }
+    attributes |= {"names": json.dumps(prediction.names), "model": source}
+    write_whole(path, KIND, _LAYOUT, arrays, attributes)
 
 
-def load_prediction(path: str | os.PathLike) -> Prediction:
+def load_prediction(path: str | os.PathLike, model: TrainedModel | None = None) -> Prediction:
     """The prediction in a file.
 
+    Args:
+        path: of the file.
+        model: that made it, if fields are wanted.
+
     Raises:
-        FlowFileError: if the file is not a whole file of a prediction, or of a newer schema.
+        FlowFileError: if the file is not a whole file of a prediction, or of another schema.
     """
 
     def assemble(attributes, arrays, sizes):
-        seconds = (float(attributes[name]) for name in ("run_seconds", "compile_seconds"))
-        return Prediction(*(arrays[name] for name in _LAYOUT), *seconds)
+        texts = {name: str(attributes[name]) for name in ("start", "operators")}
+        seconds = {f"{n}_seconds": float(attributes[f"{n}_seconds"]) for n in ("run", "compile")}
+        indicated = arrays.pop("error_indicator")
+        return Prediction(
+            names=tuple(json.loads(attributes["names"])),
+            maker=None if model is None else Maker(model),
+            indicated=jnp.asarray(indicated), **arrays, **texts, **seconds,
+        )  # fmt: skip
 
     return read_whole(path, KIND, _LAYOUT, "`jaxsph-rom predict`", assemble)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
@@ -21,12 +22,12 @@ class VisitedStates(NamedTuple):
     """States in reduced coordinates that a run passes through.
 
     Args:
-        viscosity: nu [m^2/s].
+        values: theta of the run; a viscosity [m^2/s], say.
         time: when [s] (S,).
         coordinates: of these states (S, M).
     """
 
-    viscosity: float
+    values: float | Float[np.ndarray, " coefficients"]
     time: Float[np.ndarray, " states"]
     coordinates: Float[np.ndarray, "states modes"]
 
@@ -47,8 +48,8 @@ class _OfRates(InnerProduct):
 def rate_basis(rates: EulerianRates, basis: Basis, visited: Sequence[VisitedStates]) -> Basis:
     """POD of the rates at the states visited, in the inner product of their basis, about zero.
 
-    Each state gives two snapshots, its rate without viscosity and what viscosity adds: rates at
-    any other viscosity are in their span.
+    Each state gives a snapshot of what each coefficient adds, and one of the rest: where rates are
+    affine in these, those at any other coefficients are in the span.
 
     Args:
         rates: on all reference points.
@@ -68,7 +69,7 @@ def rate_basis(rates: EulerianRates, basis: Basis, visited: Sequence[VisitedStat
             rates,
             modes,
             centre,
-            jnp.asarray(states.viscosity, dtype),
+            jnp.atleast_1d(jnp.asarray(states.values, dtype)),
             jnp.asarray(states.time, dtype),
             jnp.asarray(states.coordinates, dtype),
         )
@@ -82,11 +83,18 @@ def rate_basis(rates: EulerianRates, basis: Basis, visited: Sequence[VisitedStat
 
 
 @eqx.filter_jit
-def _parts(rates, modes, centre, viscosity, time, coordinates) -> tuple[Array, Array]:
+def _parts(rates, modes, centre, values, time, coordinates) -> tuple[Array, ...]:
     def at(state):
         time, a = state
         fields = centre + modes @ a
-        inviscid = rates(time, fields, jnp.zeros_like(viscosity))
-        return inviscid, rates(time, fields, viscosity) - inviscid
+
+        def along(direction):
+            return jax.jvp(lambda v: rates(time, fields, v), (values,), (direction,))[1]
+
+        whole = rates(time, fields, values)
+        if not values.shape[0]:
+            return (whole,)
+        added = lax.map(along, jnp.diag(values))
+        return (whole - jnp.sum(added, axis=0), *added)
 
     return lax.map(at, (time, coordinates))

@@ -21,20 +21,21 @@ from ..lattice_polynomials import LatticePolynomials, on_lattice
 from ..mode_interpolation import ModeInterpolation
 from ..reference import ReferenceSpace
 from ..splines import LocalSplines
+from .dynamics import Dynamics
 from .energy_bound import EnergyBound
 from .log_density import from_log_density, to_log_density
-from .quadratic_system import QuadraticSystem, galerkin_system
+from .points_model import PointsModel
+from .quadratic_system import galerkin_system
 from .recovery import Recovery
-from .tensor_model import TensorModel
 
 
 class ReducedFlow(eqx.Module):
-    """Basis and quadratic system of a flow on reference points; it knows no particles.
+    """Basis and dynamics of a flow on reference points; it knows no particles.
 
     Args:
         reference: reference points and the map to them.
         basis: of (r, u), r the logarithmic density.
-        system: of its coordinates.
+        system: of its coordinates, tensors or samples.
         fluid: gives densities their scale.
         recovery: of velocity and pressure where modes are solenoidal; if there is none, fields are
             those of the modes.
@@ -57,7 +58,7 @@ class ReducedFlow(eqx.Module):
 
     reference: ReferenceSpace
     basis: Basis
-    system: QuadraticSystem
+    system: Dynamics
     fluid: Fluid
     recovery: Recovery | None = None
 
@@ -101,7 +102,8 @@ class ReducedFlow(eqx.Module):
         return cls(reference, basis, system, scene.fluid)
 
     def truncated(self, modes: int) -> ReducedFlow:
-        """The reduced model of the first modes; nothing is projected again, nothing recovered.
+        """The reduced model by tensors of the first modes; nothing is projected again, nothing
+        recovered.
 
         Raises:
             ValueError: if there are not so many.
@@ -123,14 +125,14 @@ class ReducedFlow(eqx.Module):
         """The energy that the flow may have."""
         return EnergyBound.of(self.basis, self.fluid)
 
-    def model(self, viscosity: Float[Array, ""]) -> TensorModel:
-        """The model at a viscosity [m^2/s], for the time loop."""
-        return TensorModel(self.system, viscosity, self.bound)
+    def model(self, values: Float[Array, "*coefficients"]) -> PointsModel:
+        """The model at coefficients theta, a viscosity [m^2/s] say, for the time loop."""
+        return PointsModel(self.system, values, self.bound)
 
     def predict(
         self,
         coordinates: Float[Array, " modes"],
-        viscosity: Float[Array, ""],
+        values: Float[Array, "*coefficients"],
         time_step: float,
         steps_per_snapshot: int,
         snapshots: int,
@@ -140,7 +142,7 @@ class ReducedFlow(eqx.Module):
         Raises:
             SimulationError: if they are not finite or leave the bound on energy; it names the step.
         """
-        model = self.model(jnp.asarray(viscosity, coordinates.dtype))
+        model = self.model(jnp.asarray(values, coordinates.dtype))
         step = jnp.asarray(time_step, coordinates.dtype)
         _, fault, found, _ = _integrated(model, coordinates, step, steps_per_snapshot, snapshots)
         if int(fault.code) != 0:
@@ -152,11 +154,18 @@ class ReducedFlow(eqx.Module):
         coordinates: Float[Array, "times modes"],
         time: Float[np.ndarray, " times"],
         points: Float[np.ndarray, "points dim"] | None = None,
+        fluid: Fluid | None = None,
     ) -> Trajectory:
-        """Fields at the times of the coordinates, at the reference points or at others.
+        """Fields at the times of the coordinates, at the reference points or at others; traceable.
 
         Other points get the modes by interpolation that is exact at the reference points: what was
         smoothed once by the map is not smoothed again.
+
+        Args:
+            coordinates: (S, M).
+            time: (S,) [s].
+            points: (P, n) [m]; the reference points if none are given.
+            fluid: that gives the pressure; the flow's own if none is given.
 
         Raises:
             ValueError: if the points crowd a cell of the splines.
@@ -169,14 +178,13 @@ class ReducedFlow(eqx.Module):
         matrix, rest = jax.vmap(self.shown.combination)(jnp.asarray(coordinates))
         fields = functions @ matrix + rest
         density = from_log_density(fields[..., 0], self.fluid)
-        return Trajectory(
-            time=np.asarray(time),
-            position=np.broadcast_to(points, (len(time), *points.shape)),
-            velocity=np.asarray(fields[..., 1:]),
-            density=np.asarray(density),
-            pressure=np.asarray(self.fluid.pressure(density)),
-            coordinates=np.asarray(coordinates),
-        )
+        pressure = (self.fluid if fluid is None else fluid).pressure(density)
+        found = (time, fields[..., 1:], density, pressure, coordinates)
+        if not any(isinstance(a, jax.core.Tracer) for a in found):
+            found = tuple(map(np.asarray, found))
+        time, velocity, density, pressure, coordinates = found
+        position = np.broadcast_to(points, (len(time), *points.shape))
+        return Trajectory(time, position, velocity, density, pressure, coordinates)
 
     @property
     def shown(self) -> Basis | Recovery:

@@ -14,7 +14,8 @@ from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
 
 from ..field_advection import acts_on_ghosts
-from .fixed_points import check_steady, kept_effects, with_effects, with_viscosity
+from .coefficients import Coefficients
+from .fixed_points import check_quadratic, neighbors_at, on_points, with_effects
 
 
 def carried_density(pair, i, j):
@@ -59,34 +60,62 @@ class ReferenceOperators(eqx.Module):
     Advection uses gradients in difference form, sum_j (f_j - f_i) grad W V_0.
 
     Args:
-        functional: the scene's effects but for those that only keep particles evenly spread.
+        functional: of the effects' forms on fixed points.
         points: x_G (G, n) [m].
         neighbors: list of the points.
+        coefficients: what of the functional is left open: theta (K,).
     """
 
     functional: SPHFunctional
     points: Float[Array, "points dim"]
     neighbors: VerletList | WallList
+    coefficients: Coefficients
 
     @classmethod
-    def of_scene(cls, scene: Scene, points: Float[Array, "points dim"]) -> ReferenceOperators:
-        """Operators of a scene; its viscosity is a parameter of `affine`.
+    def of_scene(
+        cls,
+        scene: Scene,
+        points: Float[Array, "points dim"],
+        coefficients: Coefficients | None = None,
+    ) -> ReferenceOperators:
+        """Operators of a scene.
+
+        Args:
+            scene: whose effects and walls act.
+            points: x_G (G, n) [m].
+            coefficients: left open; the scene's viscosity if none are given.
 
         Raises:
-            ValueError: if the box is too small for the kernel's support, or a force of the scene
-                changes with time during its run.
+            ValueError: if the box is too small for the kernel's support, or an effect changes with
+                time during the scene's run, is not linear in the velocity, or has no meaning on
+                fixed points.
         """
         points = jnp.asarray(points, scene.state.position.dtype)
-        check_steady(scene, points)
-        functional = with_effects(scene.functional(), kept_effects(scene.effects))
-        search = scene.search(ParticleState(points, points, points[:, 0]))
-        return cls(functional, points, neighbors_of(search, points))
+        functional = on_points(scene)
+        neighbors = neighbors_at(functional, points)
+        check_quadratic(scene, functional, points, neighbors)
+        if coefficients is None:
+            coefficients = Coefficients.named(functional, "viscosity")
+        return cls(functional, points, neighbors, coefficients)
+
+    @classmethod
+    def of(
+        cls, functional: SPHFunctional, points: Float[Array, "points dim"]
+    ) -> ReferenceOperators:
+        """Operators by a functional of fixed points that is known to be steady; none is open."""
+        points = jnp.asarray(points, functional.mass.dtype)
+        return cls(functional, points, neighbors_at(functional, points), Coefficients(()))
+
+    def at(self, values: Float[Array, " coefficients"]) -> ReferenceOperators:
+        """The operators at theta."""
+        functional = self.coefficients.applied(self.functional, values)
+        return ReferenceOperators(functional, self.points, self.neighbors, self.coefficients)
 
     def affine(
-        self, fields: Float[Array, "points fields"], viscosity: Float[Array, ""]
+        self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]
     ) -> Float[Array, "points fields"]:
-        """Rates of (r, u) without advection, linear but for a force and moving walls."""
-        functional = with_viscosity(self.functional, viscosity)
+        """Rates of (r, u) at theta without advection, linear but for a force and moving walls."""
+        functional = self.coefficients.applied(self.functional, values)
 
         def rates(fields):
             found = functional(jnp.zeros((), fields.dtype), self._state(fields), self.neighbors)
@@ -124,12 +153,6 @@ class ReferenceOperators(eqx.Module):
 
     def _state(self, fields) -> ParticleState:
         return ParticleState(self.points, fields[:, 1:], fields[:, 0])
-
-
-@eqx.filter_jit
-def neighbors_of(search, points: Float[Array, "points dim"]):
-    """The list of fixed points."""
-    return search.build(points)
 
 
 def mapped(function, stack: Float[Array, "points fields modes"], *arguments):

@@ -36,8 +36,8 @@ def divergence_matrix(operators: ReferenceOperators) -> scipy.sparse.csr_array:
 @eqx.filter_jit
 def _divergence(operators, velocity: Float[Array, "points dim"]) -> Float[Array, " points"]:
     change = jnp.concatenate([jnp.zeros_like(velocity[:, :1]), velocity], axis=1)
-    zero = jnp.zeros((), velocity.dtype)
-    rates = jax.jvp(lambda f: operators.affine(f, zero), (operators.rest,), (change,))[1]
+    values = operators.coefficients.values(operators.functional)
+    rates = jax.jvp(lambda f: operators.affine(f, values), (operators.rest,), (change,))[1]
     return -rates[:, 0] / operators.functional.fluid.reference_density
 
 

@@ -1,4 +1,4 @@
-"""A reduced flow at many viscosities at once."""
+"""A reduced flow at many coefficients at once."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int
 
-from jaxsph.integrate import integrate
-
+from .points_model import PointsModel
 from .reduced_flow import ReducedFlow
-from .tensor_model import TensorModel
+from .schedule import EvenTimes, Schedule
 
 BATCH = 500  # members; what a step touches then stays in cache
 
@@ -41,7 +40,7 @@ class Sweep(NamedTuple):
 def sweep(
     flow: ReducedFlow,
     starts: Float[Array, "members modes"],
-    viscosities: Float[Array, " members"],
+    values: Float[Array, " *members_and_coefficients"],
     time_step: float,
     steps_per_snapshot: int,
     snapshots: int,
@@ -49,7 +48,7 @@ def sweep(
     batch: int = BATCH,
     progress: Callable[[int], None] | None = None,
 ) -> Sweep:
-    """Run a flow from each start at its viscosity by `jax.vmap` of the time loop.
+    """Run a flow from each start at its coefficients by `jax.vmap` of the time loop.
 
     Members are shared out over this process' devices. One that meets a fault stops alone. The
     first batch runs twice, once to compile.
@@ -57,7 +56,7 @@ def sweep(
     Args:
         flow: to run.
         starts: coordinates at the start.
-        viscosities: nu [m^2/s].
+        values: theta of each member; a viscosity [m^2/s], say.
         time_step: dt [s].
         steps_per_snapshot: between snapshots.
         snapshots: number of intervals.
@@ -65,36 +64,55 @@ def sweep(
         progress: is called with the number of members done since its last call.
 
     Raises:
-        ValueError: if there is no member, or there are not as many starts as viscosities.
+        ValueError: if there is no member, or there are not as many starts as coefficients.
     """
-    dtype = flow.system.linear.dtype
-    starts, viscosities = (np.asarray(a, dtype) for a in (starts, viscosities))
-    count = len(viscosities)
+    if snapshots < 1 or steps_per_snapshot < 1:
+        raise ValueError(
+            f"snapshots: at least one interval of one step, got {snapshots} of "
+            f"{steps_per_snapshot}."
+        )
+    step = jnp.asarray(time_step, flow.reference.points.dtype)
+    schedule = EvenTimes(step, steps_per_snapshot, snapshots)
+    return swept(flow, starts, values, schedule, batch=batch, progress=progress)
+
+
+def swept(
+    flow: ReducedFlow,
+    starts: Float[Array, "members modes"],
+    values: Float[Array, " *members_and_coefficients"],
+    schedule: Schedule,
+    *,
+    batch: int = BATCH,
+    progress: Callable[[int], None] | None = None,
+) -> Sweep:
+    """`sweep` at the times of a schedule."""
+    dtype = flow.reference.points.dtype
+    starts, values = (np.asarray(a, dtype) for a in (starts, values))
+    count = len(values)
     if count == 0 or starts.shape != (count, flow.system.size):
         raise ValueError(
-            f"starts: {starts.shape} for {count} viscosities and {flow.system.size} modes; give "
-            "one start for each viscosity, and at least one."
+            f"starts: {starts.shape} for {count} members and {flow.system.size} modes; give one "
+            "start for each member, and at least one."
         )
     devices = jax.local_devices()
     spread = NamedSharding(Mesh(np.asarray(devices), ("members",)), PartitionSpec("members"))
     size = len(devices) * min(batch, -(-count // len(devices)))
-    bound, step = flow.bound, jnp.asarray(time_step, dtype)
-    coordinates = np.empty((count, snapshots, flow.system.size), dtype)
+    coordinates = np.empty((count, schedule.count, flow.system.size), dtype)
     faults = np.empty((2, count), np.int32)
     seconds, first = [], None
     for begin in range(0, count, size):
         rows = np.arange(begin, min(begin + size, count))
         filled = np.resize(rows, size)  # the last batch repeats members to be full
         arguments = (
-            flow.system, bound, jax.device_put(starts[filled], spread),
-            jax.device_put(viscosities[filled], spread), step, steps_per_snapshot, snapshots,
+            flow.system, flow.bound, schedule, jax.device_put(starts[filled], spread),
+            jax.device_put(values[filled], spread),
         )  # fmt: skip
         if first is None:
             before = clock.perf_counter()
-            jax.block_until_ready(_batch(*arguments))
+            jax.block_until_ready(batch_of(*arguments))
             first = clock.perf_counter() - before
         before = clock.perf_counter()
-        found, code, at = jax.block_until_ready(_batch(*arguments))
+        found, code, at = jax.block_until_ready(batch_of(*arguments))
         seconds.append(clock.perf_counter() - before)
         done = slice(len(rows))
         coordinates[rows], faults[:, rows] = found[done], (code[done], at[done])
@@ -104,13 +122,11 @@ def sweep(
 
 
 @eqx.filter_jit
-def _batch(system, bound, starts, viscosities, time_step, steps_per_snapshot, snapshots):
-    def member(start, viscosity):
-        model = TensorModel(system, viscosity, bound)
-        first = jnp.zeros((), jnp.int32)
-        _, fault, found, good = integrate(
-            model, start, first, time_step, steps_per_snapshot, snapshots
-        )
+def batch_of(system, bound, schedule, starts, values):
+    """Coordinates, fault code and step of members; pure."""
+
+    def member(start, values):
+        found, fault, good = schedule.run(PointsModel(system, values, bound), start)
         return jnp.where(good[:, None], found, jnp.nan), fault.code, fault.step
 
-    return jax.vmap(member)(starts, viscosities)
+    return jax.vmap(member)(starts, values)

@@ -14,9 +14,9 @@ from jaxsph.walls import Walls
 from ..basis import Basis
 from ..mode_interpolation import ModeInterpolation
 from .log_density import from_log_density
+from .points_model import PointsModel
 from .recovery import Recovery
 from .reduced_flow import ReducedFlow
-from .tensor_model import TensorModel
 
 _MARGIN = 2.0  # tracers are not kept apart: cells need more room than those of a full model
 _WALL_MARGIN = 0.25  # times dx: none comes nearer to a wall
@@ -32,7 +32,7 @@ class TracerState(eqx.Module):
 class TracerModel(Model):
     """A reduced flow and tracers in it:
 
-        da/dt = f(a, nu),    dx/dt = u(x) = centre(x) + sum_m a_m phi_m(x),
+        da/dt = f(t, a; theta),    dx/dt = u(x) = centre(x) + sum_m a_m phi_m(x),
 
     the modes between the reference points as `ReducedFlow.interpolation` has them. Tracers do not
     act on the flow. As modes do not keep them inside walls, those that come too near are put back
@@ -47,7 +47,7 @@ class TracerModel(Model):
         walls: around the fluid, if it has any.
     """
 
-    flow: TensorModel
+    flow: PointsModel
     interpolation: ModeInterpolation
     shown: Basis | Recovery
     fluid: Fluid
@@ -55,10 +55,10 @@ class TracerModel(Model):
     walls: Walls | None = None
 
     @classmethod
-    def of(cls, flow: ReducedFlow, viscosity: Array, walls: Walls | None = None) -> TracerModel:
-        """The model of tracers in a flow at a viscosity [m^2/s]."""
+    def of(cls, flow: ReducedFlow, values: Array, walls: Walls | None = None) -> TracerModel:
+        """The model of tracers in a flow at coefficients theta, a viscosity say."""
         interpolation, spacing = flow.interpolation(margin=_MARGIN), flow.reference.space.spacing
-        return cls(flow.model(viscosity), interpolation, flow.shown, flow.fluid, spacing, walls)
+        return cls(flow.model(values), interpolation, flow.shown, flow.fluid, spacing, walls)
 
     def fields_at(
         self,

@@ -1,12 +1,11 @@
-"""From full runs to trained flows."""
+"""From a family of scenes to trained models."""
 
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import Any, final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,59 +13,90 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsph import Trajectory
+from jaxsph import Trajectory, run_scene
 from jaxsph.arrangements import Lattice
-from jaxsph.effects import IsotropicViscosity, LaminarViscosity
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap
-from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
+from ..basis import Energy
 from ..reference import ReferenceSpace
+from .belonging import check_runs
 from .closure import ProjectedRun, fit_linear_closure
-from .formulation import Compressible, Formulation
-from .log_density import from_log_density
+from .eulerian_rates import EulerianRates
+from .family import Family, Training
+from .formulation import Formulation, formulation_for
+from .indicator import Indicator, Places, scale_of, velocity_error
+from .laws import Between, Law
+from .linear_closure import LinearClosure
 from .reduced_flow import ReducedFlow, mapped_run
-from .trained_flow import TrainedFlow
+from .reduction import Reduction, Tensors
+from .trained_model import TrainedModel, projected_start
+from .training_errors import training_errors
 
-_UNIFORM = 1e-3  # of the largest spread over the points that a field has at any time
 # label and iterations -> context manager that gives a function to report iterations to
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[int], None]]]
 
 
-@final
-@dataclass(frozen=True)
-class LinearClosure:
-    """That a trained flow shall have a linear closure, as `fit_linear_closure` makes it.
+def train(
+    make: Callable[..., Scene] | Family,
+    parameters: Sequence[Mapping[str, Any]],
+    modes: int = 10,
+    *,
+    runs: Sequence[Trajectory] | None = None,
+    closure: LinearClosure | None = None,
+    formulation: Formulation | None = None,
+    reduction: Reduction | None = None,
+    progress: Progress | None = None,
+) -> TrainedModel:
+    """A reduced model of `make(**parameters)`, a scene of any named parameters.
+
+    Full runs are made at the training points, or taken as they are given. What the scenes'
+    operators and starts make of the parameters is found, not assumed (`TrainedModel`), and all
+    that can be refused is refused before a full run is made.
+
+    Its `training` tells what that took, `offline_seconds` to map, decompose and project and
+    `closure_seconds`, and what errors are left on its own runs: percent relative discrepancy of
+    velocity norm and pressure over the reference points, peak and median over time, `floor` of
+    the projection alone and `errors` of the reduced run, or its fault.
 
     Args:
-        held_back: Reynolds number of a training run that only judges, if there is one.
-        window: intervals between snapshots in a window, if runs are so long.
-        iterations: of the training.
-        learning_rate: at the start.
+        make: a function of named parameters that gives a scene.
+        parameters: of each training run, a dictionary of numbers.
+        modes: how many.
+        runs: of the full model, one for each, where they exist.
+        closure: to learn, if any.
+        formulation: what suits the scene (`formulation_for`) if none is given.
+        reduction: `Tensors()` if none is given; `Samples()` for effects that are not quadratic.
+        progress: opens a progress bar for each full run and for the closure.
+
+    Raises:
+        ValueError: if scenes differ in what no model can follow, or have effects that the
+            reduction does not know; if runs are not those of the scenes; or for more modes than
+            snapshots.
+        SimulationError: if a full run fails.
+
+    Examples:
+        >>> import dataclasses, jaxsph, jaxsph_rom
+        >>> from jaxsph.arrangements import Lattice
+        >>> from jaxsph.effects import LaminarViscosity, Gravity
+        >>> def make(viscosity, force):
+        ...     scene = jaxsph.scenes.taylor_green(16, end_time=0.06, arrangement=Lattice())
+        ...     others = [e for e in scene.effects if e.name != "LaminarViscosity"]
+        ...     own = (LaminarViscosity(viscosity), Gravity([force, 0.0]))
+        ...     return dataclasses.replace(scene, effects=(*others, *own))
+        >>> points = [{"viscosity": v, "force": f} for v, f in ((0.01, 0.5), (0.02, 1.0))]
+        >>> trained = jaxsph_rom.train(make, points, modes=5)
+        >>> prediction = trained.predict({"viscosity": 0.015, "force": 0.9})
+        >>> round(float(prediction.fields(0).velocity[-1, :, 0].mean()), 3)  # 0.9 * 0.06
+        0.054
     """
-
-    held_back: float | None = None
-    window: int = 50
-    iterations: int = 600
-    learning_rate: float = 0.02
-
-    def __post_init__(self):
-        if self.window < 1 or self.iterations < 1:
-            raise ValueError(
-                f"closure: window and iterations must be at least 1, got {self.window} and "
-                f"{self.iterations}."
-            )
-        if not self.learning_rate > 0.0:
-            raise ValueError(
-                f"closure: the learning rate must be positive, got {self.learning_rate}."
-            )
-
-
-def held_back(reynolds: Sequence[float]) -> float | None:
-    """The training run that had best judge a closure: an inner one of four or more, else none."""
-    inner = sorted(reynolds)[1:-1]
-    return inner[-1] if len(inner) >= 2 else None
+    return next(
+        train_each(
+            make, parameters, (modes,), runs=runs, closure=closure, formulation=formulation,
+            reduction=reduction, progress=progress,
+        )
+    )  # fmt: skip
 
 
 def reference_points(scene: Scene) -> Float[Array, "points dim"]:
@@ -74,186 +104,281 @@ def reference_points(scene: Scene) -> Float[Array, "points dim"]:
     return Lattice().positions(scene.space) if scene.walls is None else scene.state.position
 
 
-def train_flows(
-    scenes: Sequence[Scene],
-    runs: Sequence[Trajectory],
-    modes: Sequence[int],
-    formulation: Formulation | None = None,
+def check_family(
+    make: Callable[..., Scene] | Family,
+    parameters: Sequence[Mapping[str, Any]],
+    modes: Sequence[int] = (1,),
     closure: LinearClosure | None = None,
-    progress: Progress | None = None,
-) -> Iterator[TrainedFlow]:
-    """A trained flow for each number of modes; runs are mapped and projected once.
+    reduction: Reduction | None = None,
+) -> None:
+    """The ValueError that `train` would raise before a full run, if it would."""
+    training = Training(make if isinstance(make, Family) else Family(make), parameters)
+    _check(training, modes, closure, None)
+    _prepared(training, Tensors() if reduction is None else reduction)
 
-    Its `training` tells what it took, `offline_seconds` to map, decompose and project and
-    `closure_seconds`, and what errors are left on its own runs, by Reynolds number: percent
-    relative discrepancy of velocity norm and pressure over the reference points, peak and median
-    over time, `floor` of the projection alone and `errors` of the reduced run, or its fault.
 
-    Args:
-        scenes: of the runs; they differ in their Reynolds number.
-        runs: of the full model.
-        modes: numbers of modes.
-        formulation: `Compressible()` if none is given.
-        closure: to learn, if any.
-        progress: opens a progress bar for the closure.
-
-    Raises:
-        ValueError: if the scenes do not fit together, as `ReferenceSpace.snapshots` and the
-            formulation, or as `fit_linear_closure`.
-    """
-    order = np.argsort([viscosity_of(scene) for scene in scenes])
-    scenes, runs = [scenes[k] for k in order], [runs[k] for k in order]
-    product_of_scales = _check(scenes, closure)
-    first = scenes[0]
-    before = clock.perf_counter()
-    formulation = Compressible() if formulation is None else formulation
+def _prepared(training: Training, reduction: Reduction) -> tuple[ReferenceSpace, Any]:
+    """Reference space, and what the reduction knows before any run."""
+    first = training.scenes[0]
     reference = ReferenceSpace(reference_points(first), first.space, MovingLeastSquaresMap)
-    mapped = [mapped_run(reference, run, first.fluid) for run in runs]
-    largest = jax.block_until_ready(formulation.flow(first, reference, mapped, max(modes)))
-    offline = clock.perf_counter() - before
-    for count in modes:
-        flow = largest.truncated(count)
-        projected = [
-            ProjectedRun(viscosity_of(scene), np.asarray(flow.project(fields)))
-            for scene, fields in zip(scenes, mapped, strict=True)
+    found = reduction.prepared(first, reference.points, training.coefficients, training.values)
+    return reference, found
+
+
+class _Project(NamedTuple):
+    """What is the same for all numbers of modes."""
+
+    training: Training
+    reference: ReferenceSpace
+    formulation: Formulation
+    reduction: Reduction
+    prepared: Any
+    places: Places
+
+    @property
+    def first(self) -> Scene:
+        return self.training.scenes[0]
+
+    def flow(self, mapped: Sequence[np.ndarray], numbers: Sequence[int], basis):
+        """The flow of some training runs in a basis, before closure and recovery, and these."""
+        flow = ReducedFlow(self.reference, basis, None, self.first.fluid)
+        runs = [
+            ProjectedRun(self.training.values[k], np.asarray(flow.project(mapped[k])))
+            for k in numbers
         ]
-        made: dict[str, Any] = {"trained_on": [_reynolds(scene) for scene in reversed(scenes)]}
-        made |= {"formulation": formulation.name}
-        made |= {"offline_seconds": offline, "closure": "none"}
-        if closure is not None:
-            flow, learnt = _closed(flow, scenes, projected, closure, progress)
-            made |= learnt
-        flow = formulation.finished(flow, first, projected, mapped)
-        made |= _errors(flow, scenes, projected, mapped)
-        yield TrainedFlow(
-            flow,
-            np.asarray([run.viscosity for run in projected]),
-            np.stack([run.coordinates[0] for run in projected]),
-            speed_times_length=product_of_scales,
-            time_step=first.time_step,
-            steps_per_snapshot=first.steps_per_snapshot,
-            snapshots=len(runs[0].time) - 1,
-            scene=first.name,
-            parameters=first.parameters,
-            training=made,
-        )
+        dynamics = self.reduction.dynamics(self.prepared, self.first, basis, runs)
+        return ReducedFlow(self.reference, basis, dynamics, self.first.fluid), runs
+
+    @property
+    def steps(self) -> tuple[float, int]:
+        return self.first.time_step, self.first.steps_per_snapshot
 
 
-def viscosity_of(scene: Scene) -> float:
-    """nu of a scene [m^2/s].
-
-    Raises:
-        ValueError: if nothing in it is viscous.
-    """
-    for effect in scene.effects:
-        if isinstance(effect, LaminarViscosity | IsotropicViscosity):
-            return float(effect.viscosity)
-    raise ValueError(f"scene: {scene.name} has no viscosity, so no Reynolds number to run at.")
-
-
-def _reynolds(scene: Scene) -> float:
-    return float(scene.parameters["reynolds"])
-
-
-def _check(scenes: Sequence[Scene], closure: LinearClosure | None) -> float:
-    """U L of the scenes [m^2/s]; a ValueError if they do not fit together."""
-    if not scenes:
-        raise ValueError("runs: a flow needs at least one run to be trained on.")
-    numbers = [_reynolds(scene) for scene in scenes]
-    if len(set(numbers)) < len(numbers):
-        raise ValueError(f"runs: their Reynolds numbers must differ, got {numbers}.")
-    for name in ("name", "space", "time_step", "steps_per_snapshot", "steps"):
-        if any(getattr(scene, name) != getattr(scenes[0], name) for scene in scenes):
-            raise ValueError(
-                f"runs: differ in {name.replace('_', ' ')}; make them with the same settings but "
-                "for the Reynolds number."
-            )
-    scales = [_reynolds(scene) * viscosity_of(scene) for scene in scenes]
-    if not np.allclose(scales, scales[0], rtol=1e-5):
-        raise ValueError("runs: differ in U L = Re nu; make them at the same speed and length.")
-    if closure is not None and closure.held_back is not None:
-        if closure.held_back not in numbers:
-            raise ValueError(
-                f"held-back: Re {closure.held_back:g} is none of {numbers}; choose one of these."
-            )
-        if len(numbers) < 2:
-            raise ValueError("held-back: nothing is left to learn from; give more training runs.")
-    return scales[0]
-
-
-def _closed(flow, scenes, projected, closure, progress) -> tuple[ReducedFlow, dict[str, Any]]:
-    """The flow with a closure, and how that was learnt."""
-    by_reynolds = dict(zip(map(_reynolds, scenes), projected, strict=True))
-    judge = by_reynolds.pop(closure.held_back, None)
+def train_each(
+    make: Callable[..., Scene] | Family,
+    parameters: Sequence[Mapping[str, Any]],
+    modes: Sequence[int],
+    *,
+    runs: Sequence[Trajectory] | None = None,
+    closure: LinearClosure | None = None,
+    formulation: Formulation | None = None,
+    reduction: Reduction | None = None,
+    progress: Progress | None = None,
+) -> Iterator[TrainedModel]:
+    """`train` for several numbers of modes; runs are made, mapped and decomposed once."""
+    family = make if isinstance(make, Family) else Family(make)
+    training = Training(family, parameters)
+    first = training.scenes[0]
+    _check(training, modes, closure, runs)
+    if formulation is None:
+        formulation = formulation_for(first, Energy(), closed=closure is not None)
+    reduction = Tensors() if reduction is None else reduction
     before = clock.perf_counter()
+    reference, prepared = _prepared(training, reduction)
+    offline = clock.perf_counter() - before
+    if runs is None:
+        runs = [_run(scene, training, k, progress) for k, scene in enumerate(training.scenes)]
+    before = clock.perf_counter()
+    rates = EulerianRates.of(
+        training.functionals[0], reference.points, training.coefficients, listed=False
+    )
+    places = Places.among(rates)
+    project = _Project(training, reference, formulation, reduction, prepared, places)
+    mapped = [mapped_run(reference, run, first.fluid) for run in runs]
+    largest = formulation.basis(first, reference, mapped, max(modes))
+    offline += clock.perf_counter() - before
+    seconds = {"offline_seconds": offline, "full_seconds": _full_seconds(runs)}
+    for count in modes:
+        yield _trained(project, mapped, largest.truncated(count), closure, progress, seconds)
 
-    def fit(report):
-        return fit_linear_closure(
+
+def _full_seconds(runs: Sequence[Trajectory]) -> float | None:
+    """Run time of all full runs [s], also where one was taken up again; None if it is not known."""
+    seconds = 0.0
+    for run in runs:
+        known = run.metadata
+        if not {"run_seconds", "steps", "time_step"} <= known.keys():
+            return None
+        done = known["steps"] * known["time_step"]
+        seconds += known["run_seconds"] * float(run.time[-1]) / done
+    return seconds
+
+
+def _trained(
+    project: _Project, mapped, basis, closure: LinearClosure | None, progress, seconds
+) -> TrainedModel:
+    training, first = project.training, project.first
+    everything = range(len(mapped))
+    before = clock.perf_counter()
+    flow, runs = jax.block_until_ready(project.flow(mapped, everything, basis))
+    made: dict[str, Any] = {
+        "trained_on": [training.named(point) for point in training.points],
+        "formulation": project.formulation.name,
+        "reduction": project.reduction.name,
+        "coefficients": list(training.coefficients.names),
+        "closure": "none",
+    }
+    scale, left_out = _left_out(project, mapped, basis.size)
+    made |= seconds
+    made["offline_seconds"] += clock.perf_counter() - before
+    if closure is None:
+        flow = project.formulation.finished(flow, first, runs, mapped)
+    else:
+        open_ = project.formulation.finished(flow, first, runs, mapped)
+        flow, learnt = _closed(flow, training, first, runs, closure, progress)
+        made |= learnt
+        flow = project.formulation.finished(flow, first, runs, mapped)
+        scale = _scale_of_closed(flow, open_, project, mapped, left_out)
+    made["runs"] = training_errors(flow, training, runs, mapped)
+    if not left_out and not np.isfinite(scale):
+        scale = _own_scale(flow, project, runs, mapped)
+    made["left_out"] = left_out
+    starts = np.stack([run.coordinates[0] for run in runs])
+    between = training.points, training.values[: len(training.points)]
+    law = Law.find(training.known, training.values)
+    made["law"] = law is not None
+    made["interpolation_error"] = None if law is not None else Between.of(*between).left_out
+    return TrainedModel(
+        flow, training.functionals[0], training.coefficients, training.names, training.points,
+        law, Between.of(*between), _start_law(flow, training, starts),
+        Between.of(training.points, starts), Indicator.of(flow, project.places, scale),
+        time_step=first.time_step, steps_per_snapshot=first.steps_per_snapshot,
+        snapshots=len(runs[0].coordinates) - 1, scene=first.name, parameters=first.parameters,
+        training=made, source=training,
+    )  # fmt: skip
+
+
+def _start_law(flow: ReducedFlow, training: Training, starts) -> Law | None:
+    if not training.family.starts:
+        return None
+    scenes = [*training.scenes, *training.probes]
+    found = np.stack([np.asarray(projected_start(flow, scene)) for scene in scenes])
+    largest = np.abs(found).max(initial=0.0)
+    return Law.find(training.known, found, np.full(found.shape[1], largest))
+
+
+def _run(scene: Scene, training: Training, k: int, progress: Progress | None) -> Trajectory:
+    label = "full model, " + _label(training, k)
+    opened = nullcontext(None) if progress is None else progress(label, scene.steps, 0)
+    with opened as report:
+        return run_scene(scene, progress=report)
+
+
+def _label(training: Training, k: int) -> str:
+    named = training.named(training.points[k])
+    return ", ".join(f"{name} = {value:g}" for name, value in named.items())
+
+
+def _check(training: Training, modes, closure: LinearClosure | None, runs) -> None:
+    """A ValueError for what is known to fail before a full run."""
+    first, count = training.scenes[0], len(training.scenes)
+    available = count * (1 + first.steps // first.steps_per_snapshot)
+    for wanted in modes:
+        if isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
+            raise ValueError(f"modes: a number from 1 on, got {wanted!r}.")
+        if wanted > available:
+            raise ValueError(
+                f"modes: {wanted} asked for, but the training runs give {available} snapshots; "
+                "ask for fewer modes, a longer run or more training runs."
+            )
+    if closure is not None and closure.held_back is not None:
+        if dict(closure.held_back) not in [training.named(p) for p in training.points]:
+            raise ValueError(
+                f"held_back: {dict(closure.held_back)} is no training point; choose one of these."
+            )
+        if count < 2:
+            raise ValueError("held_back: nothing is left to learn from; give more training runs.")
+    if runs is not None:
+        check_runs(training.scenes, runs, lambda k: _label(training, k))
+    else:
+        for scene in training.scenes:
+            scene.search()  # what the box is too small for
+
+
+def _left_out(project: _Project, mapped, modes: int) -> tuple[float, list[dict[str, float]]]:
+    """The indicator's scale, and error and residual of each run by a model without it."""
+    numbers = range(len(mapped))
+    if len(mapped) < 2:
+        return float("nan"), []
+    found = []
+    for k in numbers:
+        others = [j for j in numbers if j != k]
+        snapshots = sum(mapped[j].shape[-1] for j in others)
+        basis = project.formulation.basis(
+            project.first, project.reference, [mapped[j] for j in others], min(modes, snapshots)
+        )
+        flow, runs = project.flow(mapped, others, basis)
+        flow = project.formulation.finished(flow, project.first, runs, [mapped[j] for j in others])
+        found.append(_judged(flow, project, k, mapped[k]))
+    scale = scale_of([f["error"] for f in found], [f["residual"] for f in found])
+    return scale, found
+
+
+def _scale_of_closed(flow, open_, project: _Project, mapped, left_out) -> float:
+    """The scale of a closed flow: that of its own errors, and by how much leaving a run out makes
+    the errors of the open flow larger; to leave runs out of the closure as well would cost its
+    training once for each."""
+    own = _own_scale(flow, project, None, mapped)
+    before = [_judged(open_, project, k, fields)["error"] for k, fields in enumerate(mapped)]
+    pairs = [(found["error"], b) for found, b in zip(left_out, before, strict=False)]
+    good = [a / b for a, b in pairs if np.isfinite(a) and np.isfinite(b) and a > 0.0 and b > 0.0]
+    return own * max(1.0, float(np.exp(np.mean(np.log(good))))) if good else own
+
+
+def _own_scale(flow, project: _Project, runs, mapped) -> float:
+    """The scale where there is one run: that of its own error."""
+    found = [_judged(flow, project, k, fields) for k, fields in enumerate(mapped)]
+    return scale_of([f["error"] for f in found], [f["residual"] for f in found])
+
+
+def _judged(flow: ReducedFlow, project: _Project, k: int, fields) -> dict[str, float]:
+    """Error and residual of the reduced run at a training point."""
+    start = flow.project(fields[..., 0])
+    values = project.training.values[k]
+    time = project.steps[0] * project.steps[1] * np.arange(fields.shape[-1])
+    try:
+        after = flow.predict(start, values, *project.steps, len(time) - 1)
+    except SimulationError:
+        return {"error": float("inf"), "residual": float("inf")}
+    coordinates = jnp.concatenate([start[None], after])
+    indicator = Indicator.of(flow, project.places, 1.0)
+    residual = _residual(indicator, flow, values, time, coordinates)
+    return {
+        "error": velocity_error(flow, coordinates, fields[:, 1:]), "residual": float(residual)
+    }  # fmt: skip
+
+
+@eqx.filter_jit
+def _residual(indicator, flow, values, time, coordinates):
+    return indicator.residual(flow, values, time, coordinates)
+
+
+def _closed(flow, training, scene, projected, closure, progress):
+    """The flow with a closure, and how that was learnt."""
+    held = None if closure.held_back is None else dict(closure.held_back)
+    pairs = list(zip([training.named(p) for p in training.points], projected, strict=True))
+    judge = next((run for named, run in pairs if named == held), None)
+    before = clock.perf_counter()
+    label = f"closure, M = {flow.basis.size}"
+    opened = nullcontext(None) if progress is None else progress(label, closure.iterations, 0)
+    with opened as report:
+        fitted = fit_linear_closure(
             flow.system,
-            list(by_reynolds.values()),
-            scenes[0].time_step,
-            scenes[0].steps_per_snapshot,
+            [run for named, run in pairs if named != held],
+            scene.time_step,
+            scene.steps_per_snapshot,
             held_back=judge,
             window=min(closure.window, len(projected[0].coordinates) - 1),
             iterations=closure.iterations,
             learning_rate=closure.learning_rate,
             progress=report,
         )
-
-    if progress is None:
-        fitted = fit(None)
-    else:
-        label = f"closure, M = {flow.basis.size}"
-        with progress(label, closure.iterations, 0) as report:
-            fitted = fit(report)
     learnt = {
         "closure": "linear",
         "closure_seconds": clock.perf_counter() - before,
-        "held_back": closure.held_back,
+        "held_back": held,
         "iterations": closure.iterations,
         "loss": fitted.training[-1],
         "held_back_loss": None if fitted.validation is None else min(fitted.validation),
     }
     return eqx.tree_at(lambda f: f.system, flow, fitted.system), learnt
-
-
-def _errors(flow: ReducedFlow, scenes, projected, mapped) -> dict[str, Any]:
-    """Errors on the training runs: of the projection, and of the reduced run."""
-    found: dict[str, Any] = {"floor": {}, "errors": {}}
-    for scene, run, fields in reversed(list(zip(scenes, projected, mapped, strict=True))):
-        number = f"{_reynolds(scene):.12g}"
-        density = from_log_density(jnp.asarray(fields[:, 0].T), flow.fluid)
-        speed = np.linalg.norm(fields[:, 1:], axis=1).T
-        truth = speed, np.asarray(flow.fluid.pressure(density))
-        found["floor"][number] = _discrepancies(flow, run.coordinates, truth)
-        try:
-            after = flow.predict(
-                jnp.asarray(run.coordinates[0]),
-                run.viscosity,
-                scene.time_step,
-                scene.steps_per_snapshot,
-                len(run.coordinates) - 1,
-            )
-        except SimulationError as error:
-            found["errors"][number] = str(error)
-            continue
-        after = np.concatenate([run.coordinates[:1], after])
-        found["errors"][number] = _discrepancies(flow, after, truth)
-    return found
-
-
-def _discrepancies(flow: ReducedFlow, coordinates, truth) -> dict[str, float]:
-    """Peak and median over time of the discrepancy over all reference points.
-
-    Times at which a field is all but uniform, as at a start from rest, have no relative one.
-    """
-    fields = flow.fields(coordinates, np.arange(len(coordinates)))
-    values = np.linalg.norm(fields.velocity, axis=2), fields.pressure
-    found = {}
-    for name, mine, theirs in zip(("velocity", "pressure"), values, truth, strict=True):
-        spread = np.ptp(theirs, axis=1)
-        judged = spread > _UNIFORM * spread.max()
-        percent = relative_discrepancy(theirs[judged], mine[judged])
-        found[f"{name}_peak_percent"] = float(percent.max())
-        found[f"{name}_median_percent"] = float(np.median(percent))
-    return found

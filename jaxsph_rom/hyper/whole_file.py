@@ -68,6 +68,16 @@ def read_whole(
     Raises:
         FlowFileError: if the file is foreign, truncated, or of a newer schema.
     """
+
+    def assembled(file):
+        arrays = {name: file[name][...] for name in layout}
+        return assemble(dict(file.attrs), arrays, _sizes(layout, arrays))
+
+    return open_whole(path, kind, made_by, assembled)
+
+
+def open_whole(path: str | os.PathLike, kind: tuple[str, int], made_by: str, assemble):
+    """What `assemble` makes of an open file of that kind; arguments and errors of `read_whole`."""
     path = Path(path)
     try:
         with open(path, "rb") as file:
@@ -78,12 +88,14 @@ def read_whole(
         raise FlowFileError(f"{path}: is not an HDF5 file; give one that {made_by} wrote.")
     try:
         with h5py.File(path, "r") as file:
-            attributes = dict(file.attrs)
-            _check(path, attributes, kind, made_by)
-            arrays = {name: file[name][...] for name in layout}
-        return assemble(attributes, arrays, _sizes(layout, arrays))
+            _check(path, dict(file.attrs), kind, made_by)
+            return assemble(file)
     except FlowFileError:
         raise
+    except ImportError as error:
+        raise FlowFileError(
+            f"{path}: names a class that is not here ({error}); put its module on the path."
+        ) from None
     except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError):
         raise FlowFileError(
             f"{path}: is truncated or damaged and cannot be read; restore a copy or make it anew."
@@ -101,6 +113,11 @@ def _check(path: Path, attributes: Mapping[str, Any], kind: tuple[str, int], mad
         raise FlowFileError(
             f"{path}: has schema version {version}, this jaxsph_rom reads {kind[1]}; use "
             "the version that wrote it, or a newer one."
+        )
+    if version < kind[1]:
+        raise FlowFileError(
+            f"{path}: has schema version {version}, of an earlier jaxsph_rom; make it anew by "
+            f"{made_by}."
         )
 
 

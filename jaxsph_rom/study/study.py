@@ -31,6 +31,8 @@ from ..report import Case
 from ..splines import LocalSplines
 from .recorded_run import Progress, full_run, with_record
 
+_UNIFORM = 1e-6  # of the largest spread over the probes that a field has at any time
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -327,7 +329,7 @@ class Study:
         """
         scene, full = self.scene(reynolds), self.full(reynolds)
         truth = tuple(a[: len(run.time)] for a in self.profile(reynolds))
-        percent = [relative_discrepancy(a, b) for a, b in zip(truth, profile, strict=True)]
+        percent = [_percent(a, b) for a, b in zip(truth, profile, strict=True)]
         judged = run.time >= min(self.judged_from, run.time[-1])
         case = Case(
             scene=scene.name,
@@ -348,6 +350,16 @@ class Study:
             **rest,
         )
         return Outcome(case, run.time, percent[0], percent[1], run, profile, made_of)
+
+
+def _percent(reference: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The relative discrepancy; where the reference is all but uniform, that to its largest spread
+    at any time."""
+    spread = np.ptp(reference, axis=1)
+    uniform = spread <= _UNIFORM * spread.max()
+    apart = np.abs(reference - values).mean(axis=1)
+    largest = 100.0 * apart / spread.max() if spread.max() > 0.0 else 0.0 * apart
+    return np.where(uniform, largest, relative_discrepancy(reference, values))
 
 
 def _centre_line(scene: Scene) -> np.ndarray:

@@ -5,23 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxsph.integrate import Fault, SimulationError
 
-from ..hyper import (
-    Formulation,
-    LinearClosure,
-    TrainedFlow,
-    formulation_for,
-    mapped_run,
-    sweep,
-    train_flows,
-)
-from ..hyper.fixed_points import check_steady
-from ..hyper.training import held_back, viscosity_of
+from ..hyper import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
+from ..hyper.linear_closure import held_back
+from ..hyper.training import check_family
 from .study import Experiment, ModelBasis, Outcome, Study
 
 
@@ -37,6 +27,7 @@ class TensorStudy:
         closed: whether flows have a linear closure.
         judge: Reynolds number of the training run that only judges it; chosen by `held_back` if
             none is given.
+        family: of the study's scenes; their own if none is given.
     """
 
     def __init__(
@@ -45,28 +36,31 @@ class TensorStudy:
         formulation: Formulation | None = None,
         closed: bool = False,
         judge: float | None = None,
+        family: Family | None = None,
     ):
-        self.study, self.formulation, self.closed, self.judge = study, formulation, closed, judge
+        self.study, self.formulation, self.closed = study, formulation, closed
+        self.judge = judge
+        self.family = Family(lambda reynolds: study.scene(reynolds)) if family is None else family
 
     def check(self, experiment: Experiment) -> None:
         """A ValueError if the experiment cannot be done on reference points."""
         if self.closed:
             self._closure(experiment)
         self.study.check(experiment)
-        scene = self.study.scene(experiment.trained_on[0])
-        check_steady(scene, scene.state.position)
+        check_family(self.family, _parameters(experiment.trained_on))
 
     def run(self, experiment: Experiment) -> Iterator[Outcome]:
         """All reduced runs of an experiment, each compared with the full run."""
         self.check(experiment)
         study = self.study
-        trained = train_flows(
-            [study.scene(reynolds) for reynolds in experiment.trained_on],
-            [study.full(reynolds) for reynolds in experiment.trained_on],
+        trained = train_each(
+            self.family,
+            _parameters(experiment.trained_on),
             experiment.modes,
-            self._formulation(experiment),
-            self._closure(experiment) if self.closed else None,
-            study.progress,
+            runs=[study.full(reynolds) for reynolds in sorted(experiment.trained_on, reverse=True)],
+            formulation=self._formulation(experiment),
+            closure=self._closure(experiment) if self.closed else None,
+            progress=study.progress,
         )
         for flow in trained:
             for reynolds in experiment.reynolds:
@@ -79,30 +73,24 @@ class TensorStudy:
         return formulation_for(scene, self.study.product, self.closed)
 
     def _closure(self, experiment: Experiment) -> LinearClosure:
-        judge = held_back(experiment.trained_on) if self.judge is None else self.judge
-        if judge is not None and judge not in experiment.trained_on:
+        if self.judge is None:
+            return LinearClosure(held_back(_parameters(experiment.trained_on)))
+        if self.judge not in experiment.trained_on:
             raise ValueError(
-                f"held-back: Re {judge:g} is none of {list(experiment.trained_on)}; choose one of "
-                "these."
+                f"held-back: Re {self.judge:g} is none of {list(experiment.trained_on)}; choose "
+                "one of these."
             )
-        return LinearClosure(judge)
+        return LinearClosure({"reynolds": self.judge})
 
-    def _reduced(self, experiment: Experiment, reynolds: float, trained: TrainedFlow) -> Outcome:
+    def _reduced(self, experiment: Experiment, reynolds: float, trained: TrainedModel) -> Outcome:
         study, flow = self.study, trained.flow
         scene, full = study.scene(reynolds), study.full(reynolds)
-        first = jax.tree.map(lambda field: field[:1], full)
-        start = flow.project(mapped_run(flow.reference, first, scene.fluid))
-        found = sweep(
-            flow, start, np.array([viscosity_of(scene)]), scene.time_step,
-            scene.steps_per_snapshot, len(full.time) - 1,
-        )  # fmt: skip
-        good = int(np.isfinite(found.coordinates[0]).all(axis=1).sum())  # none after a fault
-        coordinates = jnp.concatenate([start, found.coordinates[0, :good]])
-        time = full.time[: 1 + good]
+        found = trained.predict({"reynolds": reynolds}, start=full.state(0))
+        good = found.good(0)
         fault = None
-        if good < len(full.time) - 1:
-            fault = SimulationError(Fault(found.code[0], found.step[0], -1), scene.time_step)
-        probed = flow.fields(coordinates, time, study.probes(reynolds))
+        if good < len(full.time):
+            fault = SimulationError(Fault(found.status[0], found.step[0], -1), scene.time_step)
+        probed = found.fields(0, study.probes(reynolds))
         rest = {
             "modes": flow.basis.size,
             "projection": "galerkin",
@@ -114,7 +102,7 @@ class TensorStudy:
         }
         made_of = ModelBasis(rest["hyper"], rest["trained_on"], flow.basis, flow.reference)
         profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
-        return study.judged(reynolds, flow.fields(coordinates, time), profile, fault, rest, made_of)
+        return study.judged(reynolds, found.fields(0), profile, fault, rest, made_of)
 
 
 def _label(training: dict[str, Any]) -> str:
@@ -125,3 +113,7 @@ def _label(training: dict[str, Any]) -> str:
     if training["closure"] != "none":
         parts.append(f"{training['closure']} closure")
     return ", ".join(parts)
+
+
+def _parameters(reynolds) -> list[dict[str, float]]:
+    return [{"reynolds": number} for number in sorted(reynolds, reverse=True)]

@@ -9,7 +9,7 @@ import pytest
 from jaxsph.cli import main as look
 from jaxsph.io import read_trajectory
 from jaxsph_rom.cli import main
-from jaxsph_rom.hyper import load_flow, load_prediction
+from jaxsph_rom.hyper import load, load_prediction
 
 TRAIN = ["train", "taylor-green", "--resolution", "24", "--t-end", "0.05", "--modes", "2"]
 
@@ -30,18 +30,20 @@ def predict(folder, *arguments):
 
 def test_what_a_model_cost_and_gets_wrong(folder):
     read = json.loads((folder / "train.json").read_text())
-    assert read["trained_on"] == [100.0, 150.0, 200.0, 250.0] and read["held_back"] == 200.0
+    assert sorted(named["reynolds"] for named in read["trained_on"]) == [100.0, 150.0, 200.0, 250.0]
+    assert read["held_back"] == {"reynolds": 200.0}
     assert read["closure"] == "linear" and read["modes"] == 2
     for name in ("full_seconds", "offline_seconds", "closure_seconds"):
         assert read[name] > 0
-    for number in ("100", "150", "200", "250"):
-        floor, error = read["floor"][number], read["errors"][number]
+    assert len(read["runs"]) == len(read["left_out"]) == 4
+    for run in read["runs"]:
+        floor, error = run["floor"], run["errors"]
         for name in ("velocity_median_percent", "pressure_median_percent"):
             assert 0 < 0.5 * floor[name] <= error[name] < 5
     assert read["parameters"]["start"] == "balanced"
     assert read["parameters"]["arrangement"]["rule"] == "Stirred"
-    trained = load_flow(folder / "model.h5")
-    np.testing.assert_allclose(trained.reynolds, [100.0, 150.0, 200.0, 250.0])
+    trained = load(folder / "model.h5")
+    assert trained.range == {"reynolds": (100.0, 250.0)}
     assert trained.end_time == pytest.approx(0.05) and trained.scene == "taylor-green"
 
 
@@ -53,9 +55,11 @@ def test_a_sweep_from_one_line(folder, tmp_path, capsys):
     assert "stable                 8 of 8" in captured.out and "warning" not in captured.err
     assert "Re 200: velocity" in captured.out  # never a time without an error
     read = json.loads(results.read_text())
-    assert read["stable"] == read["reynolds_numbers"] == 8 and read["run_seconds"] > 0
-    found, trained = load_prediction(tmp_path / "prediction.h5"), load_flow(folder / "model.h5")
-    np.testing.assert_allclose(found.reynolds, [110, 100, 125, 150, 175, 200, 225, 250])
+    assert read["stable"] == read["members"] == 8 and read["run_seconds"] > 0
+    found, trained = load_prediction(tmp_path / "prediction.h5"), load(folder / "model.h5")
+    numbers = found.parameters["reynolds"]
+    assert not found.outside.any() and (found.error_indicator < 0.1).all()
+    np.testing.assert_allclose(numbers, [110, 100, 125, 150, 175, 200, 225, 250])
     assert found.coordinates.shape == (8, trained.snapshots + 1, 2)
     np.testing.assert_array_equal(found.status, 0)
     # a vortex decays the faster, the lower its Reynolds number
@@ -63,7 +67,7 @@ def test_a_sweep_from_one_line(folder, tmp_path, capsys):
         found.coordinates[1:, 0] ** 2, axis=1
     )
     assert (np.diff(kept) > 0).all() and (kept < 1).all()
-    exact = np.exp(-16 * np.pi**2 / found.reynolds[1:] * found.time[-1])
+    exact = np.exp(-16 * np.pi**2 / numbers[1:] * found.time[-1])
     np.testing.assert_allclose(np.log(kept), np.log(exact), rtol=0.1)  # 24 x 24 particles
     assert sorted(p.name for p in tmp_path.iterdir()) == ["p.json", "prediction.h5"]
 
@@ -103,12 +107,14 @@ def test_fields_and_tracers_as_trajectories(folder, tmp_path, capsys):
         (["--reynolds", "0"], "--reynolds"),
         (["--reynolds", "100:250"], "START:STOP:COUNT"),
         (["--reynolds", "250:100:5"], "START below STOP"),
+        (["--at", "viscosity=0.1"], "--at reynolds="),
+        (["--at", "reynolds=a"], "NAME=VALUE"),
         (["--reynolds", "100:250:1000000"], "at most 100000"),
         (["--reynolds", "100:250:101", "--fields"], "at most 100"),
         (["--reynolds", "100:250:101", "--tracers", "5"], "at most 100"),
         (["--reynolds", "100:250:60000", "--t-end", "500"], "GiB"),
         (["--reynolds", "100", "--t-end", "0.051"], "snapshot intervals"),
-        ([], "--reynolds"),
+        ([], "--at reynolds="),
     ],
 )
 def test_bad_predictions_are_one_line_and_code_2(folder, tmp_path, capsys, arguments, word):
@@ -135,8 +141,11 @@ def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
     refused("holds no reduced flow")
     path.write_bytes(content)
     with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = 2
-    refused("schema version 2")
+        file.attrs["schema_version"] = 3
+    refused("schema version 3")
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema_version"] = 1
+    refused("an earlier jaxsph_rom; make it anew")
 
 
 @pytest.mark.parametrize(
@@ -144,6 +153,8 @@ def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
     [
         (["train", "no-such-scene"], "no-such-scene"),
         (["train", "couette"], "--train"),
+        (["train", "dam-break", "--train", "100"], "no Reynolds number"),
+        (["train", "poiseuille", "--train", "10", "20", "40", "--resolution", "10"], "box"),
         (["train", "open-cavity", "--resolution", "32", "--settling", "0.01"], "KickAndHold"),
         ([*TRAIN, "--modes", "500"], "500 asked for"),
         ([*TRAIN, "--held-back", "120"], "Re 120"),

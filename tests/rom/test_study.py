@@ -5,6 +5,7 @@ import numpy as np
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import Energy, Experiment, MeanCentred, Study
+from jaxsph_rom.study import study as study_module
 
 
 def make(reynolds):
@@ -34,3 +35,10 @@ def test_a_study_about_the_mean(tmp_path):
     assert basis.centre.shape == basis.modes.shape[:2]
     own = Study(make, tmp_path, product=Energy()).basis(experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
+
+
+def test_a_field_that_is_uniform_at_the_start_has_a_discrepancy():
+    reference = np.array([[5.0, 5.0, 5.0], [1.0, 2.0, 5.0]])
+    found = study_module._percent(reference, reference + 0.04)
+    np.testing.assert_allclose(found, [1.0, 1.0])  # of a spread of 4
+    np.testing.assert_array_equal(study_module._percent(0.0 * reference, reference), 0.0)

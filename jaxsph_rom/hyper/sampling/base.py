@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from ...basis import Basis
 
 
-class Samples(NamedTuple):
+class Chosen(NamedTuple):
     """Points at which rates are evaluated, and what the modes' rates are made of there:
 
         da_m/dt = sum over samples p and fields f of B_mpf f_pf.
@@ -29,7 +29,7 @@ class Sampling(abc.ABC):
     """A rule that chooses samples; a sample is a point with all its fields."""
 
     @abc.abstractmethod
-    def choose(self, basis: Basis, rates: Basis) -> Samples:
+    def choose(self, basis: Basis, rates: Basis) -> Chosen:
         """Samples for the modes of a basis.
 
         Args:

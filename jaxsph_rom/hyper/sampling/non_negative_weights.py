@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 import scipy.linalg
 
-from .base import Samples, Sampling, check, scaled
+from .base import Chosen, Sampling, check, scaled
 
 
 @final
@@ -37,7 +37,7 @@ class NonNegativeWeights(Sampling):
         matrix = np.einsum("gfm,gfk->mkg", phi, dee).reshape(-1, len(phi))
         points, weights = _lawson_hanson(matrix, matrix.sum(axis=1), self.samples)
         tested = np.asarray(basis.modes)[points] * np.asarray(basis.weights)[None, :, None]
-        return Samples(points, np.moveaxis(tested, 2, 0) * weights[None, :, None])
+        return Chosen(points, np.moveaxis(tested, 2, 0) * weights[None, :, None])
 
 
 def _lawson_hanson(matrix, wanted, most: int):

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 import scipy.linalg
 
-from .base import Samples, Sampling, check, scaled
+from .base import Chosen, Sampling, check, scaled
 
 
 @final
@@ -48,7 +48,7 @@ class QDEIM(Sampling):
         seen = dee[points].reshape(-1, modes)
         projected = np.einsum("gfm,gfk->mk", phi, dee)
         gather = scipy.linalg.lstsq(seen.T, projected.T)[0].T  # B seen = projected, least norm
-        return Samples(points, gather.reshape(-1, count, dee.shape[1]) * _root(basis))
+        return Chosen(points, gather.reshape(-1, count, dee.shape[1]) * _root(basis))
 
 
 def _selected(modes, wanted: int):

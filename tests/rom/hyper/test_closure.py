@@ -27,7 +27,7 @@ def run(system, viscosity):
 
 
 def apart(system, wanted):
-    after = rollout(system, FIRST, jnp.asarray(wanted.viscosity), STEP, EACH, SNAPSHOTS)
+    after = rollout(system, FIRST, jnp.asarray(wanted.values), STEP, EACH, SNAPSHOTS)
     return float(np.abs(after - wanted.coordinates[1:]).max())
 
 

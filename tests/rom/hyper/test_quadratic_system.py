@@ -15,9 +15,9 @@ from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Basis, Energy, ReferenceSpace, pod
 from jaxsph_rom.hyper import (
+    PointsModel,
     QuadraticSystem,
     ReferenceOperators,
-    TensorModel,
     from_log_density,
     galerkin_system,
     to_log_density,
@@ -165,7 +165,7 @@ def test_a_vortex_decays_as_it_should_in_the_full_models_loop():
         density = to_log_density(scene.fluid.density(pressure), scene.fluid)
         snapshots.append(np.concatenate([density[:, None], velocity], axis=1))
     basis = pod(np.stack(snapshots, axis=-1), Energy(), scene.fluid, 2)
-    model = TensorModel(galerkin_system(scene, basis, points), VISCOSITY)
+    model = PointsModel(galerkin_system(scene, basis, points), VISCOSITY)
     first = snapshots[0] - basis.centre
     start = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, first)
     _, fault, found, good = jax.jit(lambda a: integrate(model, a, 0, jnp.asarray(2e-3), 10, 10))(
@@ -187,7 +187,7 @@ def test_a_run_is_mapped_into_log_density():
 
 def test_a_force_that_changes_with_time_is_refused():
     scene = open_cavity(16)
-    with pytest.raises(ValueError, match="KickAndHold changes with time.*SampledModel"):
+    with pytest.raises(ValueError, match="KickAndHold changes with time.*Samples"):
         ReferenceOperators.of_scene(scene, scene.state.position)
 
 

@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import run_scene
 from jaxsph.integrate import integrate
 from jaxsph.scenes import lid_driven_cavity
 from jaxsph_rom import Energy
@@ -19,9 +18,8 @@ from jaxsph_rom.hyper import (
     TracerState,
     fit_recovery,
     formulation_for,
-    load_flow,
-    save_flow,
-    train_flows,
+    load,
+    train,
 )
 
 RNG = np.random.default_rng(0)
@@ -79,20 +77,23 @@ def test_pressure_is_learnt_from_a_snapshot_on():
 
 @pytest.fixture(scope="module")
 def cavity():
-    scenes = [lid_driven_cavity(10, re, end_time=0.4) for re in (50.0, 100.0)]
-    runs = [run_scene(scene) for scene in scenes]
     closure = LinearClosure(window=10, iterations=20)
-    (trained,) = train_flows(scenes, runs, (4,), Solenoidal(3), closure)
-    return trained, scenes, runs
+    numbers = [{"reynolds": 50.0}, {"reynolds": 100.0}]
+    trained = train(cavity_of, numbers, 4, formulation=Solenoidal(3), closure=closure)
+    return trained, cavity_of(100.0)
+
+
+def cavity_of(reynolds):
+    return lid_driven_cavity(10, reynolds, end_time=0.4)
 
 
 def test_a_flow_between_walls_is_solenoidal_and_follows_its_runs(cavity):
-    trained, scenes, _ = cavity
-    assert formulation_for(scenes[0], Energy(), closed=False) == Solenoidal()
-    assert formulation_for(scenes[0], Energy(), closed=True) == Compressible(Energy())
+    trained, scene = cavity
+    assert formulation_for(scene, Energy(), closed=False) == Solenoidal()
+    assert formulation_for(scene, Energy(), closed=True) == Compressible(Energy())
     assert trained.training["formulation"] == "solenoidal"
-    for number in ("50", "100"):
-        error, floor = (trained.training[k][number] for k in ("errors", "floor"))
+    for run in trained.training["runs"]:
+        error, floor = run["errors"], run["floor"]
         # a sudden start of ten particles across, four modes
         assert floor["velocity_peak_percent"] < 0.5 and error["velocity_median_percent"] < 4.0
         assert error["pressure_median_percent"] < 10.0
@@ -100,9 +101,9 @@ def test_a_flow_between_walls_is_solenoidal_and_follows_its_runs(cavity):
 
 
 def test_it_is_kept_in_a_file(cavity, tmp_path):
-    trained, _, _ = cavity
-    save_flow(tmp_path / "flow.h5", trained)
-    found = load_flow(tmp_path / "flow.h5")
+    trained, _ = cavity
+    trained.save(tmp_path / "flow.h5")
+    found = load(tmp_path / "flow.h5")
     for name in ("velocity", "mean", "modes", "constant", "linear", "quadratic"):
         a, b = (getattr(t.flow.recovery, name) for t in (trained, found))
         np.testing.assert_array_equal(a, b)
@@ -110,14 +111,14 @@ def test_it_is_kept_in_a_file(cavity, tmp_path):
 
 
 def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
-    trained, scenes, _ = cavity
-    prediction = trained.predict([70.0])
-    everywhere = trained.fields(prediction, 0)
+    trained, scene = cavity
+    prediction = trained.predict({"reynolds": 70.0})
+    everywhere = prediction.fields(0)
     some = np.asarray(trained.flow.reference.points)[3:90:10]
-    found = trained.fields(prediction, 0, some)
+    found = prediction.fields(0, some)
     np.testing.assert_allclose(found.velocity, everywhere.velocity[:, 3:90:10], atol=1e-8)
     np.testing.assert_allclose(found.pressure, everywhere.pressure[:, 3:90:10], atol=1e-6)
-    model = TracerModel.of(trained.flow, jnp.asarray(1.0 / 70.0), scenes[0].walls)
+    model = TracerModel.of(trained.flow, jnp.asarray(1.0 / 70.0), scene.walls)
     start = TracerState(jnp.asarray(prediction.coordinates[0, 0]), jnp.asarray(some))
     step = jnp.asarray(trained.time_step)
     run = eqx.filter_jit(lambda m, s: integrate(m, s, jnp.asarray(0), step, 10, 2))

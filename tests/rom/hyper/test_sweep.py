@@ -12,12 +12,8 @@ from jaxsph.kernels import WendlandC2
 from jaxsph_rom import Basis, ReferenceSpace
 from jaxsph_rom.hyper import (
     EnergyBound,
-    FlowFileError,
     QuadraticSystem,
     ReducedFlow,
-    TrainedFlow,
-    load_prediction,
-    save_prediction,
     sweep,
 )
 
@@ -43,14 +39,6 @@ def make_flow(growth=0.0):
     system = QuadraticSystem(jnp.zeros((2, MODES)), jnp.asarray(linear), jnp.asarray(quadratic))
     fluid = Fluid(*map(jnp.asarray, (1.0, 10.0, 1.0)))
     return ReducedFlow(ReferenceSpace(points, space, ShepardMap), basis, system, fluid)
-
-
-def trained(flow):
-    return TrainedFlow(
-        flow, np.array([0.01, 0.02]), np.array([[1.0, 0.5, 0.0], [0.8, 0.1, 0.0]]),
-        speed_times_length=2.0, time_step=STEPS[0], steps_per_snapshot=STEPS[1],
-        snapshots=STEPS[2], scene="a-flow", parameters={}, training={},
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("batch", [3, 7, 100])
@@ -96,39 +84,6 @@ def test_energy_is_that_of_the_fields():
     assert float(flow.bound.energy(jnp.asarray(a))) == pytest.approx(a @ a / 64, rel=1e-12)
     assert not flow.bound.exceeded(jnp.asarray([15.9, 0.0, 0.0]))  # (2 U)^2 at |a|^2 = 256
     assert flow.bound.exceeded(jnp.asarray([16.1, 0.0, 0.0]))
-
-
-def test_starts_between_and_beyond_the_training_runs():
-    flow = trained(make_flow())
-    np.testing.assert_allclose(flow.reynolds, [100.0, 200.0])
-    found = flow.start(np.array([0.015, 0.005, 0.5]))
-    np.testing.assert_allclose(found[0], [0.9, 0.3, 0.0])
-    np.testing.assert_array_equal(found[1:], flow.starts)
-    assert flow.intervals_to(0.1) == 5 and flow.end_time == pytest.approx(0.4)
-    with pytest.raises(ValueError, match="nearest is 0.1 s"):
-        flow.intervals_to(0.105)
-    with pytest.raises(ValueError, match="reynolds: must be positive"):
-        flow.predict(np.array([100.0, -1.0]))
-
-
-def test_a_prediction_and_its_file(tmp_path):
-    flow = trained(make_flow(growth=50.0))
-    flow.starts[:, 2] = [0.0, 0.1]
-    prediction = flow.predict([200.0, 100.0], snapshots=30)
-    assert prediction.coordinates.shape == (2, 31, MODES)
-    np.testing.assert_array_equal(prediction.coordinates[:, 0], flow.starts)
-    alone = flow.flow.predict(jnp.asarray(flow.starts[0]), 0.01, *STEPS[:2], 30)
-    np.testing.assert_allclose(prediction.coordinates[0, 1:], alone, rtol=0, atol=1e-14)
-    assert prediction.good(0) == 31 and 1 < prediction.good(1) < 31
-    assert len(flow.fields(prediction, 1).time) == prediction.good(1)
-    path = tmp_path / "prediction.h5"
-    save_prediction(path, prediction, "model.h5")
-    found = load_prediction(path)
-    for mine, theirs in zip(found, prediction, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
-    path.write_bytes(path.read_bytes()[:500])
-    with pytest.raises(FlowFileError, match="truncated or damaged"):
-        load_prediction(path)
 
 
 def test_without_members_there_is_no_sweep():

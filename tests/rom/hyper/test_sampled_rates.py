@@ -1,4 +1,4 @@
-"""The sampled reduced model: terms that are not polynomial, forces in time, the full loop."""
+"""Rates at samples: terms that are not polynomial, forces in time, the full loop."""
 
 import equinox as eqx
 import jax
@@ -17,7 +17,8 @@ from jaxsph_rom.hyper import (
     QDEIM,
     EulerianRates,
     NonNegativeWeights,
-    SampledModel,
+    PointsModel,
+    SampledRates,
     VisitedStates,
     rate_basis,
     to_log_density,
@@ -72,7 +73,7 @@ def kicked():
 def test_an_equation_of_state_and_a_force_that_tensors_cannot_have(kicked, sampling):
     rates, basis, modes_of_rates = kicked
     samples = sampling.choose(basis, modes_of_rates)
-    model = SampledModel.of_samples(rates, basis, samples, 0.3 * VISCOSITY)
+    model = PointsModel(SampledRates.of_samples(rates, basis, samples), 0.3 * VISCOSITY)
     assert len(samples.points) < 0.5 * len(rates.points)
     a = np.random.default_rng(1).normal(size=3)
     # neither the state, nor the times, nor the viscosity was trained on
@@ -101,12 +102,13 @@ def test_a_vortex_decays_as_it_should_in_the_full_models_loop():
     rates = EulerianRates.of_scene(scene, points)
     modes_of_rates = rate_basis(rates, basis, [VisitedStates(VISCOSITY, time, coordinates)])
     samples = NonNegativeWeights(12).choose(basis, modes_of_rates)
-    model = SampledModel.of_samples(rates, basis, samples, VISCOSITY)
-    assert len(model.modes) <= len(points) and model.gather.shape == (2, len(samples.points), 3)
+    model = PointsModel(SampledRates.of_samples(rates, basis, samples), VISCOSITY)
+    assert len(model.dynamics.modes) <= len(points)
+    assert model.dynamics.gather.shape == (2, len(samples.points), 3)
 
     @eqx.filter_jit
     def run(viscosity):
-        swept = eqx.tree_at(lambda m: m.viscosity, model, viscosity)
+        swept = eqx.tree_at(lambda m: m.values, model, viscosity)
         first = jnp.asarray(coordinates[0])
         return integrate(swept, first, jnp.asarray(0), jnp.asarray(5e-3), 4, 5)[1:3]
 
@@ -121,7 +123,7 @@ def test_a_vortex_decays_as_it_should_in_the_full_models_loop():
 def test_coordinates_that_are_lost_are_a_fault(kicked):
     rates, basis, modes_of_rates = kicked
     samples = QDEIM(3).choose(basis, modes_of_rates)
-    model = SampledModel.of_samples(rates, basis, samples, VISCOSITY)
+    model = PointsModel(SampledRates.of_samples(rates, basis, samples), VISCOSITY)
     fault = model.inspect(jnp.asarray(7), jnp.asarray([0.0, jnp.nan, 0.0]), None)
     assert (int(fault.code), int(fault.step)) == (int(FaultCode.NOT_FINITE), 7)
 

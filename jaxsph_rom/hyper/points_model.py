@@ -8,24 +8,25 @@ from jaxtyping import Array, Float
 
 from jaxsph.integrate import Fault, FaultCode, Model
 
+from .dynamics import Dynamics
 from .energy_bound import EnergyBound
-from .quadratic_system import QuadraticSystem
 
 
-class TensorModel(Model):
-    """da/dt of a `QuadraticSystem` at a viscosity; its state are the coordinates a (M,).
+class PointsModel(Model):
+    """da/dt of a `Dynamics` at its coefficients; its state are the coordinates a (M,).
 
-    It runs in the full model's loop at a cost of M^3 a step, whatever the number of particles. What
-    is recorded are the coordinates; fields are made of these on demand.
+    It runs in the full model's loop, by tensors at a cost of M^3 a step, whatever the number of
+    particles. What is recorded are the coordinates; fields are made of these on demand.
 
     Args:
-        system: constant, linear and quadratic part.
-        viscosity: nu [m^2/s], a leaf to sweep or to differentiate.
+        dynamics: what moves the coordinates.
+        values: theta of the operators, a leaf to sweep or to differentiate; a viscosity [m^2/s],
+            say.
         bound: on the energy; without one a run is only known to be lost once it is not finite.
     """
 
-    system: QuadraticSystem
-    viscosity: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    dynamics: Dynamics
+    values: Float[Array, "*coefficients"] = eqx.field(converter=jnp.asarray)
     bound: EnergyBound | None = None
 
     def prepare(self, state):
@@ -35,7 +36,7 @@ class TensorModel(Model):
         return auxiliary
 
     def rates(self, time, state, auxiliary):
-        return self.system(state, self.viscosity)
+        return self.dynamics.rates(time, state, self.values)
 
     def finish(self, state):
         return state
