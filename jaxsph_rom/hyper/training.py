@@ -25,7 +25,7 @@ from .belonging import check_runs
 from .closure import ProjectedRun, fit_linear_closure
 from .eulerian_rates import EulerianRates
 from .family import Family, Training
-from .formulation import Formulation, formulation_for
+from .formulation import Compressible, Formulation
 from .indicator import Indicator, Places, scale_of, velocity_error
 from .laws import Between, Law
 from .linear_closure import LinearClosure
@@ -66,7 +66,9 @@ def train(
         modes: how many.
         runs: of the full model, one for each, where they exist.
         closure: to learn, if any.
-        formulation: what suits the scene (`formulation_for`) if none is given.
+        formulation: `Compressible()` if none is given; between walls and without a closure
+            `Solenoidal()` has the better pressure, and the worse velocity where flows are far from
+            steady (`benchmarks.walled_rom`).
         reduction: `Tensors()` if none is given; `Samples()` for effects that are not quadratic.
         progress: opens a progress bar for each full run and for the closure.
 
@@ -171,7 +173,7 @@ def train_each(
     first = training.scenes[0]
     _check(training, modes, closure, runs)
     if formulation is None:
-        formulation = formulation_for(first, Energy(), closed=closure is not None)
+        formulation = Compressible(Energy())
     reduction = Tensors() if reduction is None else reduction
     before = clock.perf_counter()
     reference, prepared = _prepared(training, reduction)
