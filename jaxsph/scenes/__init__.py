@@ -16,6 +16,7 @@ from .rotating_square_patch import rotating_square_patch as rotating_square_patc
 from .scales import Scale as Scale
 from .scene import Scene as Scene
 from .shear_layer import shear_layer as shear_layer
+from .solution import Solution as Solution
 from .standing_wave import standing_wave as standing_wave
 from .taylor_green import taylor_green as taylor_green
 from .taylor_green import taylor_green_3d as taylor_green_3d

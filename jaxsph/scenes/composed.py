@@ -21,6 +21,7 @@ from ..walls.walls import fill
 from .fitting import fitted_resolution
 from .scales import Scale
 from .scene import Scene
+from .solution import ExactFlow
 
 _CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `WallRepulsion`
 
@@ -44,6 +45,7 @@ def composed(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     dtype=None,
+    solution: ExactFlow | None = None,
     parameters: dict[str, Any],
 ) -> Scene:
     """What every scene of this library does with its settings.
@@ -68,6 +70,7 @@ def composed(
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
         dtype: float64 or float32; JAX's default if none is given.
+        solution: the exact flow, if it is known; as of `Scene`.
         parameters: what the scene was made with, for the record; what all share is added.
 
     Raises:
@@ -123,6 +126,7 @@ def composed(
             "dtype": str(dtype),
         },
         walls=around,
+        solution=solution,
     )
 
 

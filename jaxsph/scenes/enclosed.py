@@ -15,6 +15,7 @@ from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
 from .scales import Scale
 from .scene import Scene
+from .solution import ExactFlow
 
 
 def enclosed_flow(
@@ -38,6 +39,7 @@ def enclosed_flow(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     dtype=None,
+    solution: ExactFlow | None = None,
     parameters: dict[str, Any],
 ) -> Scene:
     """A flow between walls, at rest at the start.
@@ -62,6 +64,7 @@ def enclosed_flow(
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         dtype: float64 or float32; JAX's default if none is given.
+        solution: the exact flow, if it is known; as of `Scene`.
         parameters: what the scene was made with, for the record; what all share is added.
 
     Raises:
@@ -89,5 +92,6 @@ def enclosed_flow(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
+        solution=solution,
         parameters={**parameters, "layers": layers, "scheme": record(scheme)},
     )

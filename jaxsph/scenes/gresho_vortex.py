@@ -39,6 +39,11 @@ def gresho_pressure(position):
     return REFERENCE_DENSITY * p
 
 
+def gresho_flow(position, time):
+    """Velocity (N, 2) [m/s] and pressure (N,) [Pa]; the eddy is steady."""
+    return gresho_velocity(position), gresho_pressure(position)
+
+
 def gresho_vortex(
     resolution: int | None = None,
     *,
@@ -88,6 +93,7 @@ def gresho_vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
+        solution=gresho_flow,
         parameters={"scale": scale, "scheme": record(scheme)},
     )
 
