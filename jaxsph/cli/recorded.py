@@ -14,11 +14,12 @@ from ..history import energy_unit
 from ..integrate import Model, SimulationError
 from ..io import TrajectoryFileError, TrajectoryWriter
 from ..metrics import kinetic_energy
+from ..progress import progress_bar
 from ..scenes import Scene
 from ..simulate import simulate
 from ..trajectory import Trajectory
 from .errors import fail
-from .options import STEPPING, print_rows, progress_bar
+from .options import STEPPING, print_rows
 
 REPORT = "report.html"  # its name, beside the trajectory
 

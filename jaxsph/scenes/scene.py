@@ -14,6 +14,7 @@ from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
 from ..particles import ParticleState, in_dtype
+from ..shown import concrete, line, table
 from ..walls import Walls
 from ..walls.filling import refuse_rows_at_walls, volume
 from .checks import check_filled, check_one_fluid, check_resolved
@@ -156,6 +157,27 @@ class Scene(eqx.Module):
         if self.walls is not None:
             return volume(self.walls.start_region, self.space)
         return self.space.box.volume if all(self.space.box.periodic) else None
+
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.state.position):
+            return None
+        walls = "none" if self.walls is None else f"{len(self.walls.position)} ghosts"
+        return {
+            "name": self.name,
+            "particles": f"{len(self.state.position)} in {self.space.box.dim}D",
+            "spacing": f"{self.space.spacing:.4g} m",
+            "h/dx": f"{self.space.smoothing_length / self.space.spacing:.4g}",
+            "walls": walls,
+            "effects": ", ".join(effect.name for effect in self.effects),
+            "steps": f"{self.steps} of {self.time_step:.4g} s",
+            "end time": f"{self.end_time:.4g} s",
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return table(self, self._rows())
 
     def functional(self) -> SPHFunctional:
         """The scene's effects composed into f(w, t; mu)."""
