@@ -1,10 +1,12 @@
 """Scenes, one a file; `SCENES` lists them by the name that users type."""
 
 from .balanced import balanced as balanced
+from .composed import composed as composed
 from .continued import continued as continued
 from .couette import couette as couette
 from .dam_break import dam_break as dam_break
 from .elliptic_drop import elliptic_drop as elliptic_drop
+from .enclosed import enclosed_flow as enclosed_flow
 from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity

@@ -29,13 +29,13 @@ _CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `
 def composed(
     name: str,
     *,
-    effects: Callable[[Any], tuple[Effect, ...]],
+    effects: tuple[Effect, ...],
     box: Box,
     scale: Scale,
     end_time: float,
     reference_density: float,
     reference_speed: float,
-    mach: float,
+    mach: float = 0.1,
     sound_speed: float | None = None,
     side: float | None = None,
     region: Region | None = None,
@@ -46,13 +46,13 @@ def composed(
     kernel: Kernel | None = None,
     dtype=None,
     solution: ExactFlow | None = None,
-    parameters: dict[str, Any],
+    parameters: dict[str, Any] | None = None,
 ) -> Scene:
     """What every scene of this library does with its settings.
 
     Args:
         name: of the scene.
-        effects: makes the effects, their coefficients in a given dtype.
+        effects: what acts on the particles.
         box: around all that may happen.
         scale: resolution, h/dx and steps.
         end_time: [s].
@@ -107,7 +107,7 @@ def composed(
     density = fluid.density(jnp.asarray(start, dtype))
     return Scene(
         name=name,
-        effects=effects(dtype),
+        effects=effects,
         fluid=fluid,
         space=space,
         state=in_dtype(ParticleState(position, moving, density), dtype),
@@ -115,7 +115,7 @@ def composed(
         end_time=end_time,
         steps_per_snapshot=scale.steps_per_snapshot,
         parameters={
-            **parameters,
+            **(parameters or {}),
             "resolution": scale.resolution,
             "h_over_dx": scale.h_over_dx,
             "time_step": scale.time_step,

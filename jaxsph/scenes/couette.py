@@ -11,7 +11,7 @@ from ..effects import Effect
 from ..effects.base import VISCOUS_LIMIT
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Consistent, Scheme
+from ..schemes import Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -86,7 +86,7 @@ def couette(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=Consistent() if scheme is None else scheme,
+        scheme=scheme,
         dtype=dtype,
         solution=CouetteFlow(1.0 / reynolds) if wall_velocity is None else None,
         parameters={

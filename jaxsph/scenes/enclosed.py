@@ -10,7 +10,7 @@ from ..domain import Box
 from ..effects import BodyForce, Effect
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Scheme
+from ..schemes import Consistent, Scheme
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
 from .scales import Scale
@@ -27,12 +27,12 @@ def enclosed_flow(
     end_time: float,
     reference_density: float,
     reference_speed: float,
-    mach: float,
+    mach: float = 0.1,
     viscosity: float,
-    scheme: Scheme,
+    scheme: Scheme | None = None,
     side: float | None = None,
     moving: Sequence[MovingWall] = (),
-    force: Callable[[Any], BodyForce] | None = None,
+    force: BodyForce | None = None,
     wall_velocity: Effect | None = None,
     pressure: Callable | None = None,
     layers: int | None = None,
@@ -40,7 +40,7 @@ def enclosed_flow(
     kernel: Kernel | None = None,
     dtype=None,
     solution: ExactFlow | None = None,
-    parameters: dict[str, Any],
+    parameters: dict[str, Any] | None = None,
 ) -> Scene:
     """A flow between walls, at rest at the start.
 
@@ -54,10 +54,10 @@ def enclosed_flow(
         reference_speed: U [m/s].
         mach: U / c0.
         viscosity: nu [m^2/s].
-        scheme: of `jaxsph.schemes`.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
-        force: makes the body force in a given dtype, if there is one.
+        force: body force, if there is one.
         wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
         layers: of ghosts; as many as fill the kernel's support if none is given.
@@ -71,14 +71,11 @@ def enclosed_flow(
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
     positive(viscosity=viscosity)
-
-    def effects(dtype) -> tuple[Effect, ...]:
-        drive = None if force is None else force(dtype)
-        return scheme.effects(dtype, viscosity, drive, fluid_region, wall_velocity)
+    scheme = Consistent() if scheme is None else scheme
 
     return composed(
         name,
-        effects=effects,
+        effects=scheme.effects(viscosity, force, fluid_region, wall_velocity),
         box=box,
         scale=scale,
         end_time=end_time,
@@ -93,5 +90,5 @@ def enclosed_flow(
         kernel=kernel,
         dtype=dtype,
         solution=solution,
-        parameters={**parameters, "layers": layers, "scheme": record(scheme)},
+        parameters={**(parameters or {}), "layers": layers, "scheme": record(scheme)},
     )

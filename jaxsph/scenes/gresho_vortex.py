@@ -81,7 +81,7 @@ def gresho_vortex(
     scheme = Consistent() if scheme is None else scheme
     return composed(
         "gresho-vortex",
-        effects=scheme.effects,
+        effects=scheme.effects(),
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,

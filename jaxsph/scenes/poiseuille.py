@@ -8,7 +8,7 @@ from ..arrangements import Arrangement, JitteredLattice
 from ..effects import Effect, Gravity
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Consistent, Scheme
+from ..schemes import Scheme
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
 from .plane_flow_solution import PoiseuilleFlow
@@ -64,7 +64,7 @@ def poiseuille(
         box=channel_box(chosen),
         fluid_region=CHANNEL,
         side=1.0,
-        force=lambda dtype: Gravity(jnp.asarray([8.0 * viscosity, 0.0], dtype)),
+        force=Gravity(jnp.asarray([8.0 * viscosity, 0.0])),
         scale=chosen,
         end_time=end_time,
         reference_density=1.0,
@@ -75,7 +75,7 @@ def poiseuille(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=Consistent() if scheme is None else scheme,
+        scheme=scheme,
         dtype=dtype,
         solution=None if wall_velocity is not None else PoiseuilleFlow(viscosity, 8.0 * viscosity),
         parameters={

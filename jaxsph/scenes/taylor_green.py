@@ -104,7 +104,7 @@ def _vortex(
 
     return composed(
         name,
-        effects=lambda dtype: scheme.effects(dtype, viscosity),
+        effects=scheme.effects(viscosity),
         box=Box.unit_periodic(dim),
         scale=chosen,
         end_time=end_time,
