@@ -37,7 +37,7 @@ from jaxsph.plotting.style import (
     save,
     sheet,
 )  # fmt: skip
-from jaxsph.scenes import Scene, taylor_green_solution
+from jaxsph.scenes import Scene
 from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
 from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
@@ -154,12 +154,8 @@ class _Judge:
         self.exact = self._exact(run.time)
 
     def _exact(self, time) -> tuple[np.ndarray, np.ndarray]:
-        viscosity = 1.0 / self.scene.parameters["reynolds"]
-        density = self.scene.fluid.reference_density
-        line = jnp.asarray(self.line)
-        solution = taylor_green_solution
-        velocity = np.stack([solution.velocity(line, t, viscosity) for t in time])
-        pressure = np.stack([solution.pressure(line, t, viscosity, density) for t in time])
+        fields = [self.scene.exact(self.line, t) for t in time]
+        velocity, pressure = (np.stack(field) for field in zip(*fields, strict=True))
         return np.linalg.norm(velocity, axis=2), pressure
 
     def row(self, family: str, setting: str, profile, seconds) -> dict[str, Any]:

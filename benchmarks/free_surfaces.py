@@ -127,7 +127,6 @@ def still_water(
     places = JitteredLattice(jitter).positions(space) if jitter else lattice
     position = places[np.asarray(lattice[:, -1]) < 1.0]
     effects = scheme.free_surface_effects(
-        jnp.float64,
         LaminarViscosity(1e-6),
         force=Gravity(jnp.zeros(dim).at[dim - 1].set(-1.0)),
         vessel=tank,

@@ -272,9 +272,7 @@ def _box(case, scheme):
     if case["start"] == "gravity":
         force = Gravity(jnp.zeros(dim).at[dim - 1].set(-1.0))
         density = density + (1.0 - position[:, dim - 1]) / 100.0
-    effects = scheme.effects(
-        jnp.float64, 1.0 / case["reynolds"], force, None if periodic else region
-    )
+    effects = scheme.effects(1.0 / case["reynolds"], force, None if periodic else region)
     every = round(end / 20.0 / (0.2 * dx))
     return Scene(
         "box", effects, Fluid(1.0, 10.0, 1.0), space, ParticleState(position, velocity, density),
@@ -292,7 +290,7 @@ def _disc(case, scheme):
     offset = position - 0.7
     velocity = jnp.stack([-offset[:, 1], offset[:, 0]], axis=1)
     density = 1000.0 + 5.0 * (jnp.sum(offset**2, axis=1) - 0.36)
-    effects = scheme.effects(jnp.float64, 1.0 / case["reynolds"], None, region, FreeSlip())
+    effects = scheme.effects(1.0 / case["reynolds"], None, region, FreeSlip())
     return Scene(
         "disc", effects, Fluid(1000.0, 10.0, 1.0), space,
         ParticleState(position, velocity, density), 20.0 / 1400, 20.0, 70,

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import os
-from contextlib import nullcontext
+from collections.abc import Callable
+from functools import partial
 
 from .kept_run import kept_run
+from .progress import shown_steps
 from .simulate import simulate
 from .trajectory import Trajectory
 
 
-def run_scene(scene, path: str | os.PathLike | None = None, **options) -> Trajectory:
+def run_scene(
+    scene,
+    path: str | os.PathLike | None = None,
+    *,
+    progress: bool | Callable[[int], None] | None = None,
+    **options,
+) -> Trajectory:
     """`simulate` the full model of a scene by the scene's own steps.
 
     Args:
         scene: to run.
         path: of a trajectory file that keeps the run, if any: it is made, gone on with where it was
             cut short, or read where it is whole. The scene may be any, edited ones too.
-        options: of `simulate`: `progress`, `stepping`, and, without a path, `recorder`.
+        progress: True for a bar on stderr, as of the command line; or what is called with the
+            number of steps done since its last call.
+        options: of `simulate`: `stepping`, and, without a path, `recorder`.
 
     Raises:
         TrajectoryFileError: if the file holds another run, naming what differs; it stays as it is.
@@ -33,24 +43,27 @@ def run_scene(scene, path: str | os.PathLike | None = None, **options) -> Trajec
         >>> bool(energy[-1] < energy[0])  # viscosity takes it
         True
     """
+    shown = partial(shown_steps, progress, scene.steps)
     if path is not None:
-        progress = options.pop("progress", None)
         return kept_run(
             path,
             scene,
             scene.model,
             lambda _: scene.state,
             lambda trajectory: trajectory.state(-1),
-            lambda _: nullcontext(progress),
+            shown,
             made_by={"stepping": options["stepping"]} if "stepping" in options else None,
             **options,
         )
-    return simulate(
-        scene.model(),
-        scene.state,
-        time_step=scene.time_step,
-        steps=scene.steps,
-        steps_per_snapshot=scene.steps_per_snapshot,
-        metadata={"scene": scene.name, "parameters": scene.parameters},
-        **options,
-    )
+    model = scene.model()
+    with shown() as report:
+        return simulate(
+            model,
+            scene.state,
+            time_step=scene.time_step,
+            steps=scene.steps,
+            steps_per_snapshot=scene.steps_per_snapshot,
+            progress=report,
+            metadata={"scene": scene.name, "parameters": scene.parameters},
+            **options,
+        )

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from .particles import ParticleState
+from .shown import concrete, line, spread, table
 
 
 class Snapshot(eqx.Module):
@@ -56,3 +61,92 @@ class Trajectory(eqx.Module):
         """The particles of a snapshot, as a run can go on from them; -1 for the last."""
         fields = (self.position, self.velocity, self.density)
         return ParticleState(*(jnp.asarray(field[number]) for field in fields))
+
+    def snapshot(self, number: int) -> Snapshot:
+        """A snapshot by its number; -1 for the last."""
+        coordinates = None if self.coordinates is None else self.coordinates[number]
+        fields = (self.position, self.velocity, self.density, self.pressure)
+        return Snapshot(*(field[number] for field in fields), coordinates)
+
+    # What follows imports inside, since plotting and io import this module.
+
+    def plot(self, time: float | None = None, **options: Any) -> Any:
+        """A figure of the snapshot nearest to a time; its `savefig` writes it to a file.
+
+        Args:
+            time: [s]; the end if none is given.
+            options: of `jaxsph.plotting.snapshot_figure`: `fields`.
+        """
+        from .plotting import snapshot_figure
+
+        number = -1 if time is None else self.nearest(time)
+        return snapshot_figure(float(self.time[number]), self.snapshot(number), **options)
+
+    def animate(self, path: str | os.PathLike, **options: Any) -> Path:
+        """A moving picture of all snapshots; returns its path.
+
+        Args:
+            path: of the picture, ending with `.gif` or `.mp4`; one that is there is replaced.
+            options: of `jaxsph.plotting.animate`, as `field` and `every`.
+
+        Raises:
+            ValueError: as `jaxsph.plotting.animate`.
+        """
+        from .plotting.animation import draw_animation
+
+        return draw_animation(self._one_by_one, path, **options)
+
+    def save(self, path: str | os.PathLike, overwrite: bool = False) -> Path:
+        """Write a trajectory file, which `jaxsph.io.read_trajectory` reads; returns its path.
+
+        No run can go on from it, as it does not know what made the run; `run_scene(scene, path)`
+        writes one that does.
+
+        Args:
+            path: of the file; folders are made as needed.
+            overwrite: whether an existing file may be replaced.
+
+        Raises:
+            ValueError: if times do not increase.
+            TrajectoryFileError: if the file exists, or cannot be written.
+        """
+        from .io import save_trajectory
+
+        return save_trajectory(self, path, overwrite)
+
+    def to_xarray(self) -> Any:
+        """An `xarray.Dataset` over time, particle and direction, units among its attributes.
+
+        Raises:
+            ImportError: if xarray is not installed.
+        """
+        from .io.dataset import dataset
+
+        return dataset(self)
+
+    def _one_by_one(self, every: int) -> Iterator[Trajectory]:
+        if every < 1:
+            raise ValueError(f"every: every {every}-th snapshot; give at least 1.")
+        numbers = range(0, len(self.time), every)
+        return (jax.tree.map(lambda field: field[k : k + 1], self) for k in numbers)  # noqa: B023
+
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.time, self.velocity, self.density):
+            return None
+        name = self.metadata.get("scene")
+        speed = np.linalg.norm(self.velocity, axis=-1)
+        return {
+            **({} if name is None else {"scene": str(name)}),
+            "snapshots": f"{len(self.time)}, at {spread(self.time, 's')}",
+            "particles": f"{self.particles} in {self.position.shape[-1]}D",
+            "speed": spread(speed, "m/s"),
+            "density": spread(self.density, "kg/m^3"),
+            "pressure": spread(self.pressure, "Pa"),
+            **({} if self.coordinates is None else {"modes": str(self.coordinates.shape[-1])}),
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return table(self, self._rows())

@@ -1,5 +1,6 @@
 """A run that was killed goes on to the result of one that was not."""
 
+import json
 import os
 import subprocess
 import sys
@@ -52,8 +53,11 @@ def test_killed_run_goes_on(tmp_path, capsys):
     assert not checkpoint.complete
     assert 4 <= checkpoint.step < checkpoint.steps == 100
     before = read_trajectory(path)
-    assert main(["run", "taylor-green", "--resume", str(path)]) == 0
-    assert main([*RUN, "--out", str(unbroken)]) == 0
+    reports = [tmp_path / "resumed.json", tmp_path / "whole.json"]
+    assert main(["run", "taylor-green", "--resume", str(path), "--json", str(reports[0])]) == 0
+    assert main([*RUN, "--out", str(unbroken), "--json", str(reports[1])]) == 0
+    errors = [json.loads(report.read_text())["errors"] for report in reports]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-6)  # against the same exact flow
     resumed, whole = read_trajectory(path), read_trajectory(unbroken / "trajectory.h5")
     np.testing.assert_array_equal(resumed.time, whole.time)
     for name in FIELDS:

@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxsph.arrangements import Packed
-from jaxsph.scenes import Scene, taylor_green_solution
+from jaxsph.scenes import Scene
+from jaxsph.scenes.taylor_green_solution import kinetic_energy
 
 from ..measure import progress
 from .speed import leave_out, load_all, make_scene, write_case
@@ -91,11 +91,9 @@ def _errors(worker: Worker, folder: Path, scene: Scene, time: float) -> dict[str
     worker.ask("state", path=str(path))
     with np.load(path) as arrays:
         position, velocity, pressure = (arrays[k] for k in ("position", "velocity", "pressure"))
-    viscosity, density = 1.0 / scene.parameters["reynolds"], scene.fluid.reference_density
-    at = jnp.asarray(position)
-    exact_velocity = np.asarray(taylor_green_solution.velocity(at, time, viscosity))
-    exact_pressure = np.asarray(taylor_green_solution.pressure(at, time, viscosity, density))
-    exact_energy = float(taylor_green_solution.kinetic_energy(time, viscosity, density))
+    exact_velocity, exact_pressure = map(np.asarray, scene.exact(position, time))
+    density = float(scene.fluid.reference_density)
+    exact_energy = float(kinetic_energy(time, scene.exact.viscosity, density))
     energy = 0.5 * float(scene.mass) * float((velocity**2).sum())
     norm = np.linalg.norm
     apart = pressure - pressure.mean() - (exact_pressure - exact_pressure.mean())

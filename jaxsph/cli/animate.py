@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..io import read_overview
-from .options import positive_int, print_rows, progress_bar
+from ..progress import progress_bar
+from .options import positive_int, print_rows
 
 FRAMES = 100  # at most, unless more are asked for
 FIELDS = ("velocity", "pressure", "density")

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ..io import read_overview, write_vtkhdf
 from ..io.vtkhdf import EXPORTED
-from .options import positive_int, print_rows, progress_bar
+from ..progress import progress_bar
+from .options import positive_int, print_rows
 
 
 def add_to(commands) -> None:

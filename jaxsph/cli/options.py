@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 
 import numpy as np
-from tqdm import tqdm
 
 from ..arrangements import JitteredLattice, Lattice, Packed, Stirred
 from ..integrate import AutomaticSteps, FixedSteps
@@ -83,12 +81,6 @@ def margin(text: str) -> float:
     if not 1.0 <= value < math.inf:
         raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
     return value
-
-
-def progress_bar(total: int, unit: str, done: int = 0) -> tqdm:
-    """A bar on stderr with the estimated time left, seldom redrawn where that is a log file."""
-    interval = 0.1 if sys.stderr.isatty() else 10.0
-    return tqdm(total=total, initial=done, unit=unit, file=sys.stderr, mininterval=interval)
 
 
 def print_rows(rows: dict[str, str]) -> None:

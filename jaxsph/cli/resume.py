@@ -165,7 +165,7 @@ def _restored(path: Path, checkpoint: Checkpoint, end_time: float | None) -> Sce
         )
     _check_unedited(path, checkpoint, scene)
     if state is not None:
-        scene = dataclasses.replace(scene, state=_arrays(state))
+        scene = _later(scene, state)
     return scene if end_time is None else _longer(scene, end_time, checkpoint)
 
 
@@ -181,7 +181,7 @@ def _made_again(path: Path, checkpoint: Checkpoint, options, make) -> Scene:
     checkpoint.check(path, wanted)
     if checkpoint.state is None:
         return scene
-    return dataclasses.replace(scene, state=_arrays(checkpoint.state))
+    return _later(scene, checkpoint.state)
 
 
 def _check_unedited(path: Path, checkpoint: Checkpoint, scene: Scene) -> None:
@@ -212,6 +212,11 @@ def _check_later(end_time: float, scene: Scene, checkpoint: Checkpoint) -> None:
     done = max(0, checkpoint.step) * scene.time_step
     if not end_time > done * (1.0 + 1e-9):
         raise ValueError(f"--t-end: the run has come to t = {done:g} s; give a later time.")
+
+
+def _later(scene: Scene, state: ParticleState) -> Scene:
+    """The scene with its particles as its own run left them, so that its exact flow still holds."""
+    return dataclasses.replace(scene, state=_arrays(state), solution=scene.exact)
 
 
 def _arrays(state: ParticleState) -> ParticleState:

@@ -11,8 +11,9 @@ import jax
 import numpy as np
 
 from ..integrate import explanation
+from ..progress import progress_bar
 from ..sweeps import sweep
-from .options import positive_int, print_rows, progress_bar, reynolds_numbers, seed
+from .options import positive_int, print_rows, reynolds_numbers, seed
 from .scene_functions import is_file, made, scene_function
 from .scene_options import add_scene_options, scene_settings
 

@@ -26,7 +26,7 @@ def described(thing: Any) -> tuple[str, Parts]:
         return "wrapped", {"function": thing.__wrapped__}
     kind = type(thing)
     if dataclasses.is_dataclass(kind):
-        names = [field.name for field in dataclasses.fields(kind)]
+        names = [field.name for field in dataclasses.fields(kind) if field.compare]
     elif hasattr(thing, "__dict__"):
         names = [
             name

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -52,15 +53,29 @@ def animate(
         TrajectoryFileError: if the source is not a whole trajectory file with a snapshot in it, or
             the picture's folder does not serve.
     """
+    return draw_animation(
+        partial(snapshot_blocks, source, 1), path, field, every, frames_per_second, progress
+    )
+
+
+def draw_animation(
+    snapshots: Callable[[int], Iterator[Trajectory]],
+    path: str | os.PathLike,
+    field: ParticleField = VELOCITY,
+    every: int = 1,
+    frames_per_second: int = 15,
+    progress: Callable[[int], None] | None = None,
+) -> Path:
+    """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew."""
     path = Path(path)
     if path.suffix not in _WRITERS:
         raise ValueError(f"{path}: pictures end with {' or '.join(_WRITERS)}; name it so.")
     if frames_per_second < 1:
         raise ValueError(f"frames_per_second: {frames_per_second}; give at least 1.")
-    blocks = snapshot_blocks(source, 1, every)
+    blocks = snapshots(every)
     check_target(path)
     writer, settings = _WRITERS[path.suffix](frames_per_second)
-    view = _View.of(source, field, every)
+    view = _View.of(snapshots(every), field)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
@@ -119,9 +134,9 @@ class _View:
     decimals: int
 
     @classmethod
-    def of(cls, source, field: ParticleField, every: int) -> _View:
+    def of(cls, blocks: Iterator[Trajectory], field: ParticleField) -> _View:
         lows, highs, values, times = [], [], [], []
-        for block in snapshot_blocks(source, 1, every):
+        for block in blocks:
             position, value = _shown(block, field)
             lows.append(position.min(axis=0))
             highs.append(position.max(axis=0))

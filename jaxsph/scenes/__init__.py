@@ -1,10 +1,12 @@
 """Scenes, one a file; `SCENES` lists them by the name that users type."""
 
 from .balanced import balanced as balanced
+from .composed import composed as composed
 from .continued import continued as continued
 from .couette import couette as couette
 from .dam_break import dam_break as dam_break
 from .elliptic_drop import elliptic_drop as elliptic_drop
+from .enclosed import enclosed_flow as enclosed_flow
 from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity
@@ -16,6 +18,7 @@ from .rotating_square_patch import rotating_square_patch as rotating_square_patc
 from .scales import Scale as Scale
 from .scene import Scene as Scene
 from .shear_layer import shear_layer as shear_layer
+from .solution import Solution as Solution
 from .standing_wave import standing_wave as standing_wave
 from .taylor_green import taylor_green as taylor_green
 from .taylor_green import taylor_green_3d as taylor_green_3d

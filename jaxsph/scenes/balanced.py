@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -53,7 +55,8 @@ def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Sc
             f"balanced: the imbalance went from {float(before):.3g} to {float(after):.3g}; "
             "start from particles that are more even, or leave the scene as it is."
         )
-    return eqx.tree_at(lambda s: s.state.density, scene, density)
+    start = dataclasses.replace(scene.state, density=density)
+    return dataclasses.replace(scene, state=start, solution=scene.exact)
 
 
 @eqx.filter_jit

@@ -21,6 +21,7 @@ from ..walls.walls import fill
 from .fitting import fitted_resolution
 from .scales import Scale
 from .scene import Scene
+from .solution import ExactFlow
 
 _CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `WallRepulsion`
 
@@ -28,13 +29,13 @@ _CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `
 def composed(
     name: str,
     *,
-    effects: Callable[[Any], tuple[Effect, ...]],
+    effects: tuple[Effect, ...],
     box: Box,
     scale: Scale,
     end_time: float,
     reference_density: float,
     reference_speed: float,
-    mach: float,
+    mach: float = 0.1,
     sound_speed: float | None = None,
     side: float | None = None,
     region: Region | None = None,
@@ -44,13 +45,14 @@ def composed(
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     dtype=None,
-    parameters: dict[str, Any],
+    solution: ExactFlow | None = None,
+    parameters: dict[str, Any] | None = None,
 ) -> Scene:
     """What every scene of this library does with its settings.
 
     Args:
         name: of the scene.
-        effects: makes the effects, their coefficients in a given dtype.
+        effects: what acts on the particles.
         box: around all that may happen.
         scale: resolution, h/dx and steps.
         end_time: [s].
@@ -68,6 +70,7 @@ def composed(
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
         dtype: float64 or float32; JAX's default if none is given.
+        solution: the exact flow, if it is known; as of `Scene`.
         parameters: what the scene was made with, for the record; what all share is added.
 
     Raises:
@@ -104,7 +107,7 @@ def composed(
     density = fluid.density(jnp.asarray(start, dtype))
     return Scene(
         name=name,
-        effects=effects(dtype),
+        effects=effects,
         fluid=fluid,
         space=space,
         state=in_dtype(ParticleState(position, moving, density), dtype),
@@ -112,7 +115,7 @@ def composed(
         end_time=end_time,
         steps_per_snapshot=scale.steps_per_snapshot,
         parameters={
-            **parameters,
+            **(parameters or {}),
             "resolution": scale.resolution,
             "h_over_dx": scale.h_over_dx,
             "time_step": scale.time_step,
@@ -123,6 +126,7 @@ def composed(
             "dtype": str(dtype),
         },
         walls=around,
+        solution=solution,
     )
 
 

@@ -11,10 +11,11 @@ from ..effects import Effect
 from ..effects.base import VISCOUS_LIMIT
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Consistent, Scheme
+from ..schemes import Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
+from .plane_flow_solution import CouetteFlow
 from .scales import Scale
 from .scene import Scene
 
@@ -45,8 +46,8 @@ def couette(
 ) -> Scene:
     """Couette flow from rest: a channel 1 m high whose upper wall slides with U = 1 m/s.
 
-    Re = U H / nu; periodic along the channel; rho0 = 1 kg/m^3. `plane_flow_solution.couette` is
-    its exact solution.
+    Re = U H / nu; periodic along the channel; rho0 = 1 kg/m^3. Between walls of
+    the scheme's own no-slip `plane_flow_solution.couette` is its exact solution.
 
     Args:
         resolution: particles across; overrides the scale's, time step scaled along.
@@ -85,8 +86,9 @@ def couette(
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=Consistent() if scheme is None else scheme,
+        scheme=scheme,
         dtype=dtype,
+        solution=CouetteFlow(1.0 / reynolds) if wall_velocity is None else None,
         parameters={
             "scale": scale,
             "reynolds": reynolds,

@@ -80,14 +80,12 @@ def dam_break(
     wall_velocity = NoSlip() if wall_velocity is None else wall_velocity
     vessel, height = BoxRegion((0.0, 0.0), tank), column[1]
 
-    def effects(dtype):
-        return scheme.free_surface_effects(
-            dtype,
-            ArtificialViscosity(jnp.asarray(alpha, dtype)),
-            force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
-            vessel=vessel,
-            wall_velocity=wall_velocity,
-        )
+    effects = scheme.free_surface_effects(
+        ArtificialViscosity(jnp.asarray(alpha, float)),
+        force=Gravity(jnp.asarray([0.0, -GRAVITY])),
+        vessel=vessel,
+        wall_velocity=wall_velocity,
+    )
 
     return composed(
         "dam-break",

@@ -92,14 +92,11 @@ def elliptic_drop(
         raise ValueError(f"pull: zero or positive, got {pull:g} rad/s.")
     middle = 0.5 * REFERENCE_DENSITY * (STRAIN**2 + pull**2)  # Pa, times R^2 - r^2
 
-    def effects(dtype):
-        pulled = CentralForce(jnp.asarray(pull, dtype), (0.0, 0.0)) if pull > 0.0 else None
-        viscosity = ArtificialViscosity(jnp.asarray(alpha, dtype))
-        return scheme.free_surface_effects(dtype, viscosity, force=pulled)
-
+    pulled = CentralForce(jnp.asarray(pull, float), (0.0, 0.0)) if pull > 0.0 else None
+    viscosity = ArtificialViscosity(jnp.asarray(alpha, float))
     return composed(
         "elliptic-drop",
-        effects=effects,
+        effects=scheme.free_surface_effects(viscosity, force=pulled),
         box=Box((-REACH, -REACH), (REACH, REACH), (False, False)),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,

@@ -10,11 +10,12 @@ from ..domain import Box
 from ..effects import BodyForce, Effect
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Scheme
+from ..schemes import Consistent, Scheme
 from ..walls import MovingWall, Region, Walls
 from .composed import composed, positive
 from .scales import Scale
 from .scene import Scene
+from .solution import ExactFlow
 
 
 def enclosed_flow(
@@ -26,19 +27,20 @@ def enclosed_flow(
     end_time: float,
     reference_density: float,
     reference_speed: float,
-    mach: float,
+    mach: float = 0.1,
     viscosity: float,
-    scheme: Scheme,
+    scheme: Scheme | None = None,
     side: float | None = None,
     moving: Sequence[MovingWall] = (),
-    force: Callable[[Any], BodyForce] | None = None,
+    force: BodyForce | None = None,
     wall_velocity: Effect | None = None,
     pressure: Callable | None = None,
     layers: int | None = None,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     dtype=None,
-    parameters: dict[str, Any],
+    solution: ExactFlow | None = None,
+    parameters: dict[str, Any] | None = None,
 ) -> Scene:
     """A flow between walls, at rest at the start.
 
@@ -52,30 +54,28 @@ def enclosed_flow(
         reference_speed: U [m/s].
         mach: U / c0.
         viscosity: nu [m^2/s].
-        scheme: of `jaxsph.schemes`.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
-        force: makes the body force in a given dtype, if there is one.
+        force: body force, if there is one.
         wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
         layers: of ghosts; as many as fill the kernel's support if none is given.
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
         dtype: float64 or float32; JAX's default if none is given.
+        solution: the exact flow, if it is known; as of `Scene`.
         parameters: what the scene was made with, for the record; what all share is added.
 
     Raises:
         ValueError: for a value out of range, a bad geometry, or a time step beyond its limit.
     """
     positive(viscosity=viscosity)
-
-    def effects(dtype) -> tuple[Effect, ...]:
-        drive = None if force is None else force(dtype)
-        return scheme.effects(dtype, viscosity, drive, fluid_region, wall_velocity)
+    scheme = Consistent() if scheme is None else scheme
 
     return composed(
         name,
-        effects=effects,
+        effects=scheme.effects(viscosity, force, fluid_region, wall_velocity),
         box=box,
         scale=scale,
         end_time=end_time,
@@ -89,5 +89,6 @@ def enclosed_flow(
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
-        parameters={**parameters, "layers": layers, "scheme": record(scheme)},
+        solution=solution,
+        parameters={**(parameters or {}), "layers": layers, "scheme": record(scheme)},
     )

@@ -39,6 +39,11 @@ def gresho_pressure(position):
     return REFERENCE_DENSITY * p
 
 
+def gresho_flow(position, time):
+    """Velocity (N, 2) [m/s] and pressure (N,) [Pa]; the eddy is steady."""
+    return gresho_velocity(position), gresho_pressure(position)
+
+
 def gresho_vortex(
     resolution: int | None = None,
     *,
@@ -76,7 +81,7 @@ def gresho_vortex(
     scheme = Consistent() if scheme is None else scheme
     return composed(
         "gresho-vortex",
-        effects=scheme.effects,
+        effects=scheme.effects(),
         box=Box.unit_periodic(2),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
@@ -88,6 +93,7 @@ def gresho_vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
+        solution=gresho_flow,
         parameters={"scale": scale, "scheme": record(scheme)},
     )
 

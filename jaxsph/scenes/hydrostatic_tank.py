@@ -72,7 +72,7 @@ def hydrostatic_tank(
         "hydrostatic-tank",
         box=Box((0.0, 0.0), (1.0, 1.0), (False, False)),
         fluid_region=BoxRegion((0.0, 0.0), (1.0, 1.0)),
-        force=lambda dtype: Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
+        force=Gravity(jnp.asarray([0.0, -GRAVITY])),
         scale=chosen,
         end_time=end_time,
         reference_density=REFERENCE_DENSITY,

@@ -84,11 +84,8 @@ def open_cavity(
         )
     chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
 
-    def drive(dtype):
-        amplitude, steepness, duration, remainder = (
-            jnp.asarray(v, dtype) for v in (100.0, 400.0, 0.01 - start_time, 0.001)
-        )
-        return KickAndHold(amplitude, steepness, duration, remainder, (0.1, 0.0), (0.3, 0.1))
+    kick = (jnp.asarray(v) for v in (100.0, 400.0, 0.01 - start_time, 0.001))
+    drive = KickAndHold(*kick, (0.1, 0.0), (0.3, 0.1))
 
     return enclosed_flow(
         "open-cavity",

@@ -82,16 +82,15 @@ def oscillating_drop(
         h = scale.h_over_dx * 2.0 * RADIUS / scale.resolution
         return 0.9 * math.sqrt(REFERENCE_DENSITY * h**3 / (2.0 * math.pi * TENSION))
 
-    def effects(dtype):
-        return (
-            Continuity(),
-            PressureForce(),
-            LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)),
-            DensityDiffusion(jnp.asarray(DELTA, dtype)),
-            FreeSurface(),
-            SurfaceDiffusion(),
-            SurfaceTension(jnp.asarray(TENSION, dtype)),
-        )
+    effects = (
+        Continuity(),
+        PressureForce(),
+        LaminarViscosity(jnp.asarray(1.0 / reynolds)),
+        DensityDiffusion(jnp.asarray(DELTA)),
+        FreeSurface(),
+        SurfaceDiffusion(),
+        SurfaceTension(jnp.asarray(TENSION)),
+    )
 
     return composed(
         "oscillating-drop",

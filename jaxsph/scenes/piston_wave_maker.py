@@ -125,13 +125,11 @@ def piston_wave_maker(
             )
         return Walls.around(tank, space, bodies=(MovingBody(piston, PistonStroke(stroke, period)),))
 
-    def effects(dtype):
-        return scheme.free_surface_effects(
-            dtype,
-            ArtificialViscosity(jnp.asarray(alpha, dtype)),
-            force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
-            vessel=tank,
-        )
+    effects = scheme.free_surface_effects(
+        ArtificialViscosity(jnp.asarray(alpha, float)),
+        force=Gravity(jnp.asarray([0.0, -GRAVITY])),
+        vessel=tank,
+    )
 
     return composed(
         "piston-wave-maker",

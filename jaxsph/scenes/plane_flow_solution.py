@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import final
+
 import numpy as np
 from jaxtyping import Float
 
@@ -15,8 +18,10 @@ def couette(
 
         u = y + sum_n 2 (-1)^n / (n pi) sin(n pi y) exp(-nu n^2 pi^2 t),
 
-    the sum up to n = 400.
+    the sum up to n = 400; at t = 0, where that is not enough, rest.
     """
+    if time == 0.0:
+        return np.zeros_like(height)
     n = np.arange(1, _TERMS + 1)[:, None]
     y = np.asarray(height)[None, :]
     terms = 2.0 * (-1.0) ** n / (n * np.pi) * np.sin(n * np.pi * y)
@@ -38,3 +43,40 @@ def poiseuille(
     terms = 4.0 * force / (viscosity * (n * np.pi) ** 3) * np.sin(n * np.pi * y)
     steady = 0.5 * force / viscosity * y[0] * (1.0 - y[0])
     return steady - (terms * np.exp(-viscosity * (n * np.pi) ** 2 * time)).sum(axis=0)
+
+
+@final
+@dataclass(frozen=True)
+class CouetteFlow:
+    """`couette` as velocity (N, 2) [m/s] and pressure (N,) [Pa], zero, at positions (N, 2) [m].
+
+    Args:
+        viscosity: nu [m^2/s].
+    """
+
+    viscosity: float
+
+    def __call__(self, position, time):
+        return _along(couette(position[:, 1], time, self.viscosity))
+
+
+@final
+@dataclass(frozen=True)
+class PoiseuilleFlow:
+    """`poiseuille` as velocity (N, 2) [m/s] and pressure (N,) [Pa], zero, at positions (N, 2) [m].
+
+    Args:
+        viscosity: nu [m^2/s].
+        force: b [m/s^2].
+    """
+
+    viscosity: float
+    force: float
+
+    def __call__(self, position, time):
+        return _along(poiseuille(position[:, 1], time, self.viscosity, self.force))
+
+
+def _along(speed):
+    rest = np.zeros_like(speed)
+    return np.stack([speed, rest], axis=1), rest

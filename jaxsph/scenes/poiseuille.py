@@ -8,9 +8,10 @@ from ..arrangements import Arrangement, JitteredLattice
 from ..effects import Effect, Gravity
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Consistent, Scheme
+from ..schemes import Scheme
 from .couette import CHANNEL, channel_box, channel_scale
 from .enclosed import enclosed_flow, positive
+from .plane_flow_solution import PoiseuilleFlow
 from .scene import Scene
 
 
@@ -33,7 +34,8 @@ def poiseuille(
     """Poiseuille flow from rest: a channel 1 m high under a force that drives it to U = 1 m/s.
 
     b = 8 nu U / H^2 along the channel, so that the steady profile peaks at U; Re = U H / nu;
-    rho0 = 1 kg/m^3. `plane_flow_solution.poiseuille` is its exact solution.
+    rho0 = 1 kg/m^3. Between walls of the scheme's own no-slip `plane_flow_solution.poiseuille` is
+    its exact solution.
 
     Args:
         resolution: particles across; overrides the scale's, time step scaled along.
@@ -55,25 +57,27 @@ def poiseuille(
         ValueError: for a Reynolds number, resolution or step out of range.
     """
     positive(reynolds=reynolds, **{"t-end": end_time})
+    viscosity = 1.0 / reynolds
     chosen = channel_scale(scale, reynolds, end_time, resolution, h_over_dx, time_step)
     return enclosed_flow(
         "poiseuille",
         box=channel_box(chosen),
         fluid_region=CHANNEL,
         side=1.0,
-        force=lambda dtype: Gravity(jnp.asarray([8.0 / reynolds, 0.0], dtype)),
+        force=Gravity(jnp.asarray([8.0 * viscosity, 0.0])),
         scale=chosen,
         end_time=end_time,
         reference_density=1.0,
         reference_speed=1.0,
         mach=mach,
-        viscosity=1.0 / reynolds,
+        viscosity=viscosity,
         wall_velocity=wall_velocity,
         layers=layers,
         arrangement=JitteredLattice(amplitude=0.25) if arrangement is None else arrangement,
         kernel=kernel,
-        scheme=Consistent() if scheme is None else scheme,
+        scheme=scheme,
         dtype=dtype,
+        solution=None if wall_velocity is not None else PoiseuilleFlow(viscosity, 8.0 * viscosity),
         parameters={
             "scale": scale,
             "reynolds": reynolds,

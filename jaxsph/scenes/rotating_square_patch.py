@@ -86,7 +86,7 @@ def rotating_square_patch(
     half = 0.5 * SIDE
     return composed(
         "rotating-square-patch",
-        effects=scheme.free_surface_effects,
+        effects=scheme.free_surface_effects(),
         box=Box((-REACH, -REACH), (REACH, REACH), (False, False)),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,

@@ -14,9 +14,11 @@ from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
 from ..particles import ParticleState, in_dtype
+from ..shown import concrete, line, table
 from ..walls import Walls
 from ..walls.filling import refuse_rows_at_walls, volume
 from .checks import check_filled, check_one_fluid, check_resolved
+from .solution import ExactFlow, Solution
 
 _SKIN = 0.82  # times dx: rebuilt about every second step of the paper's settings (measured)
 _WALL_MARGIN = 1.3  # times the list's need at the start: particles begin on a lattice there
@@ -39,6 +41,8 @@ class Scene(eqx.Module):
         steps_per_snapshot: between recorded snapshots.
         parameters: what the scene was made with, JSON-like, for the record.
         walls: around the fluid, if it has any.
+        solution: the exact flow, if it is known: positions (N, n) [m] and a time [s] -> velocity
+            (N, n) [m/s] and pressure (N,) [Pa]; read it as `exact`.
 
     Raises:
         ValueError: if the time step is beyond the stability limit or does not divide the end time,
@@ -57,12 +61,16 @@ class Scene(eqx.Module):
     steps_per_snapshot: int = eqx.field(static=True)
     parameters: dict[str, Any] = eqx.field(static=True, default_factory=dict)
     walls: Walls | None = None
+    # what is known of a run does not make it another run: `content` leaves it out
+    solution: ExactFlow | Solution | None = eqx.field(static=True, default=None, compare=False)
 
     def __post_init__(self):
         dtype = self.state.position.dtype
         for name in ("effects", "fluid", "state", "walls"):
             setattr(self, name, in_dtype(getattr(self, name), dtype))
         self.time_step, self.end_time = float(self.time_step), float(self.end_time)
+        if self.solution is not None and not isinstance(self.solution, Solution):
+            self.solution = Solution.of(self, self.solution)
 
     def __check_init__(self):
         if self.steps_per_snapshot < 1:
@@ -97,6 +105,26 @@ class Scene(eqx.Module):
             )
 
     @property
+    def exact(self) -> ExactFlow | None:
+        """The exact flow; None where it is not known, or no longer holds: another effect, fluid,
+        box, wall or start than the scene was given it for. Where an edit leaves the flow as it is,
+        say so by `dataclasses.replace(scene, effects=..., solution=scene.exact)`.
+
+        Examples:
+            >>> import dataclasses
+            >>> import jaxsph
+            >>> from jaxsph.arrangements import Lattice
+            >>> scene = jaxsph.scenes.taylor_green(16, arrangement=Lattice())
+            >>> velocity, pressure = scene.exact(scene.state.position, 0.5)
+            >>> pressure.shape
+            (256,)
+            >>> dataclasses.replace(scene, effects=scene.effects[:2]).exact is None
+            True
+        """
+        holds = self.solution is not None and self.solution.holds(self)
+        return self.solution.flow if holds else None
+
+    @property
     def stable_time_step(self) -> float:
         """The largest stable step [s]: acoustic CFL of the paper, and those of its effects."""
         acoustic = CFL * self.space.smoothing_length / float(self.fluid.sound_speed)
@@ -129,6 +157,27 @@ class Scene(eqx.Module):
         if self.walls is not None:
             return volume(self.walls.start_region, self.space)
         return self.space.box.volume if all(self.space.box.periodic) else None
+
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.state.position):
+            return None
+        walls = "none" if self.walls is None else f"{len(self.walls.position)} ghosts"
+        return {
+            "name": self.name,
+            "particles": f"{len(self.state.position)} in {self.space.box.dim}D",
+            "spacing": f"{self.space.spacing:.4g} m",
+            "h/dx": f"{self.space.smoothing_length / self.space.spacing:.4g}",
+            "walls": walls,
+            "effects": ", ".join(effect.name for effect in self.effects),
+            "steps": f"{self.steps} of {self.time_step:.4g} s",
+            "end time": f"{self.end_time:.4g} s",
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return table(self, self._rows())
 
     def functional(self) -> SPHFunctional:
         """The scene's effects composed into f(w, t; mu)."""

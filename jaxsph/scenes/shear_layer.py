@@ -85,12 +85,9 @@ def shear_layer(
 
     scheme = Consistent() if scheme is None else scheme
 
-    def effects(dtype):
-        listed = scheme.effects(dtype, 1.0 / reynolds)
-        if background_pressure == 0.0:
-            return listed
-        return (*listed, BackgroundPressure(jnp.asarray(background_pressure, dtype)))
-
+    effects = scheme.effects(1.0 / reynolds)
+    if background_pressure != 0.0:
+        effects = (*effects, BackgroundPressure(jnp.asarray(background_pressure, float)))
     return composed(
         "shear-layer",
         effects=effects,

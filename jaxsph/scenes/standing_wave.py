@@ -102,13 +102,11 @@ def standing_wave(
         speed = amplitude * FREQUENCY / math.sinh(WAVE_NUMBER * DEPTH)
         return speed * jnp.stack([-jnp.sin(kx) * jnp.cosh(ky), jnp.cos(kx) * jnp.sinh(ky)], axis=1)
 
-    def effects(dtype):
-        return scheme.free_surface_effects(
-            dtype,
-            LaminarViscosity(jnp.asarray(1.0 / reynolds, dtype)),
-            force=Gravity(jnp.asarray([0.0, -GRAVITY], dtype)),
-            vessel=vessel,
-        )
+    effects = scheme.free_surface_effects(
+        LaminarViscosity(jnp.asarray(1.0 / reynolds)),
+        force=Gravity(jnp.asarray([0.0, -GRAVITY])),
+        vessel=vessel,
+    )
 
     return composed(
         "standing-wave",

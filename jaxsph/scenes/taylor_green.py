@@ -90,22 +90,21 @@ def _vortex(
     positive(reynolds=reynolds, mach=mach, **{"t-end": end_time})
     chosen = pick_scale(scales, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
     viscosity, density = 1.0 / reynolds, REFERENCE_DENSITY
+    vortex = exact.DecayingVortex(viscosity, density) if dim == 2 else None
     if scheme is None:
         scheme = DeltaPlus() if dim == 2 else Consistent()
 
     def velocity(position):
-        if dim == 2:
-            return exact.velocity(position, 0.0, viscosity)
-        return exact.initial_velocity_3d(position)
+        return vortex(position, 0.0)[0] if dim == 2 else exact.initial_velocity_3d(position)
 
     def pressure(position):
         if dim == 2:
-            return exact.pressure(position, 0.0, viscosity, density)
+            return vortex(position, 0.0)[1]
         return exact.initial_pressure_3d(position, density)
 
     return composed(
         name,
-        effects=lambda dtype: scheme.effects(dtype, viscosity),
+        effects=scheme.effects(viscosity),
         box=Box.unit_periodic(dim),
         scale=chosen,
         end_time=end_time,
@@ -117,5 +116,6 @@ def _vortex(
         arrangement=arrangement,
         kernel=kernel,
         dtype=dtype,
+        solution=vortex,
         parameters={"scale": scale, "reynolds": reynolds, "scheme": record(scheme)},
     )

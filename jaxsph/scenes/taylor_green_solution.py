@@ -3,7 +3,9 @@
 The velocity amplitude is U = 1 m/s, the period L = 1 m and the wave number k = 2 pi / L.
 """
 
+from dataclasses import dataclass
 from math import pi
+from typing import final
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float, ScalarLike
@@ -61,6 +63,26 @@ def kinetic_energy(
         time, viscosity, density: as for `pressure`.
     """
     return 0.25 * density * _decay(time, viscosity) ** 2
+
+
+@final
+@dataclass(frozen=True)
+class DecayingVortex:
+    """`velocity` and `pressure` of the two-dimensional vortex at positions and a time.
+
+    Args:
+        viscosity: kinematic [m^2/s].
+        density: [kg/m^3].
+    """
+
+    viscosity: float
+    density: float
+
+    def __call__(self, position, time):
+        return (
+            velocity(position, time, self.viscosity),
+            pressure(position, time, self.viscosity, self.density),
+        )
 
 
 def initial_velocity_3d(position: Float[Array, "*points 3"]) -> Float[Array, "*points 3"]:

@@ -16,7 +16,6 @@ class Scheme(ABC):
     @abstractmethod
     def effects(
         self,
-        dtype,
         viscosity: float | None = None,
         force: BodyForce | None = None,
         vessel: Region | None = None,
@@ -25,7 +24,6 @@ class Scheme(ABC):
         """The effects of a fluid that fills its box or its vessel.
 
         Args:
-            dtype: of coefficients.
             viscosity: kinematic viscosity nu [m^2/s]; none for an inviscid flow.
             force: body force, if there is one.
             vessel: where fluid may be, if there are walls.
@@ -35,7 +33,6 @@ class Scheme(ABC):
     @abstractmethod
     def free_surface_effects(
         self,
-        dtype,
         *more: Effect,
         force: BodyForce | None = None,
         vessel: Region | None = None,
@@ -44,7 +41,6 @@ class Scheme(ABC):
         """The effects of a flow with a free surface.
 
         Args:
-            dtype: of coefficients.
             more: viscosity, surface tension.
             force: body force, if there is one.
             vessel: where fluid may be, if there are walls.

@@ -40,10 +40,10 @@ class Consistent(Scheme):
     sums are the plain ones, as support is cut there.
     """
 
-    def effects(self, dtype, viscosity=None, force=None, vessel=None, wall_velocity=None):
+    def effects(self, viscosity=None, force=None, vessel=None, wall_velocity=None):
         viscous, driven, walls = (), (), ()
         if viscosity is not None:
-            viscous = (ConsistentViscosity(jnp.asarray(viscosity, dtype)),)
+            viscous = (ConsistentViscosity(jnp.asarray(viscosity, float)),)
         if force is not None:
             driven = (force,)
         if vessel is not None:
@@ -53,7 +53,7 @@ class Consistent(Scheme):
             KernelCorrection(),
             AdjointPressure(),
             *viscous,
-            DensityDiffusion(jnp.asarray(DELTA, dtype)),
+            DensityDiffusion(jnp.asarray(DELTA)),
             StrainShifting(),
             ConsistentTransport(),
             PairRepulsion(),
@@ -61,17 +61,17 @@ class Consistent(Scheme):
             *walls,
         )
 
-    def free_surface_effects(self, dtype, *more, force=None, vessel=None, wall_velocity=None):
+    def free_surface_effects(self, *more, force=None, vessel=None, wall_velocity=None):
         """Plain pairwise sums, with a continuity of walls that does not pump."""
         walls = () if vessel is None else (WallPressure(), *free_walls(vessel, wall_velocity))
         return (
             KernelCorrection(),
             AdjointContinuity(),
             PressureForce(),
-            DensityDiffusion(jnp.asarray(DELTA, dtype)),
+            DensityDiffusion(jnp.asarray(DELTA)),
             StrainShifting(),
             known.FreeSurface(),
-            VelocityDiffusion(jnp.asarray(VELOCITY_DELTA, dtype)),
+            VelocityDiffusion(jnp.asarray(VELOCITY_DELTA)),
             known.SurfaceShifting(),
             known.SurfaceDiffusion(),
             known.TensileControl(),

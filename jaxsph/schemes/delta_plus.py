@@ -25,18 +25,17 @@ from .base import Scheme
 DELTA = 0.1  # of the density diffusion
 
 
-def delta_plus(dtype, *viscosity: Effect) -> tuple[Effect, ...]:
+def delta_plus(*viscosity: Effect) -> tuple[Effect, ...]:
     """Continuity, pressure, viscosity if there is one, density diffusion, shifting and transport.
 
     Args:
-        dtype: of coefficients.
         viscosity: none for an inviscid flow.
     """
     return (
         Continuity(),
         PressureForce(),
         *viscosity,
-        DensityDiffusion(jnp.asarray(DELTA, dtype)),
+        DensityDiffusion(jnp.asarray(DELTA)),
         ParticleShifting(),
         ShiftingTransport(),
     )
@@ -52,11 +51,11 @@ class DeltaPlus(Scheme):
     (`benchmarks.schemes`). What reproduces the paper names it.
     """
 
-    def effects(self, dtype, viscosity=None, force=None, vessel=None, wall_velocity=None):
+    def effects(self, viscosity=None, force=None, vessel=None, wall_velocity=None):
         viscous = ()
         if viscosity is not None:
-            viscous = (LaminarViscosity(jnp.asarray(viscosity, dtype)),)
-        effects = delta_plus(dtype, *viscous)
+            viscous = (LaminarViscosity(jnp.asarray(viscosity, float)),)
+        effects = delta_plus(*viscous)
         if force is not None:
             effects = (*effects, force)
         if vessel is None:
@@ -64,10 +63,10 @@ class DeltaPlus(Scheme):
         slip = NoSlip() if wall_velocity is None else wall_velocity
         return (*effects, WallPressure(), slip, WallRepulsion(vessel))
 
-    def free_surface_effects(self, dtype, *more, force=None, vessel=None, wall_velocity=None):
+    def free_surface_effects(self, *more, force=None, vessel=None, wall_velocity=None):
         """The consistent delta-plus scheme (Sun et al. 2019)."""
         # looked up when called: what other flows are made of does not hang on these
-        bulk = delta_plus(dtype)
+        bulk = delta_plus()
         walls = () if vessel is None else (WallPressure(), *free_walls(vessel, wall_velocity))
         return (
             *bulk[:-1],

@@ -9,6 +9,7 @@ import scipy.linalg
 from jaxtyping import Array, Float
 
 from jaxsph import Fluid
+from jaxsph.shown import concrete, line, table
 
 from .centring import Centring
 from .inner_product import InnerProduct
@@ -45,6 +46,23 @@ class Basis(eqx.Module):
                 "ask for fewer modes or record more snapshots."
             )
         return eqx.tree_at(lambda b: b.modes, self, self.modes[:, :, :modes])
+
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.modes, self.singular_values):
+            return None
+        points, fields, modes = self.modes.shape
+        energy = cumulative_energy(self.singular_values)[min(modes, len(self.singular_values)) - 1]
+        return {
+            "modes": f"{modes} of {len(self.singular_values)}",
+            "points": f"{points} in {fields - 1}D",
+            "energy": f"{energy:.6g} %",
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return table(self, self._rows())
 
     @property
     def functions(self) -> Float[np.ndarray, "points fields functions"]:

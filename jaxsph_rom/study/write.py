@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from jaxsph.environment import environment
-from jaxsph.scenes import taylor_green_solution as exact
 
 from ..basis import cumulative_energy
 from ..report import (
@@ -193,13 +192,9 @@ def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float
             label = _label(outcome.case)
             label += f", M = {outcome.case.modes}" if several else ""
             curves[label] = (outcome.profile[0][row], outcome.profile[1][row])
-        if scene.name == "taylor-green":
-            viscosity, density = 1.0 / reynolds, float(scene.fluid.reference_density)
-            velocity = np.asarray(exact.velocity(line, full.time[k], viscosity))
-            curves["analytic"] = (
-                np.linalg.norm(velocity, axis=1),
-                np.asarray(exact.pressure(line, full.time[k], viscosity, density)),
-            )
+        if scene.exact is not None:
+            velocity, pressure = scene.exact(line, float(full.time[k]))
+            curves["analytic"] = (np.linalg.norm(velocity, axis=1), np.asarray(pressure))
         profiles.append(Profile(reynolds, line[:, 1], curves, time=float(full.time[k])))
     return centre_line_profiles(profiles, path)
 

@@ -59,7 +59,7 @@ def test_a_row_near_a_wall_is_stable_at_the_longest_step(scheme):
     position = Lattice().positions(space)
     position = position[np.asarray(channel.signed_distance(position)) < 0.0]
     state = ParticleState(position, 0.0 * position, jnp.full(len(position), RHO0))
-    effects = scheme.effects(jnp.zeros(()).dtype, 5e-3, vessel=channel)
+    effects = scheme.effects(5e-3, vessel=channel)
     fluid = Fluid(RHO0, C0, 1.0)
     longest = float(WallRepulsion(channel).step_limit(fluid, space))
     assert longest == pytest.approx(2.12 * DX / C0, rel=1e-2)

@@ -86,3 +86,13 @@ def test_snapshots_that_are_not_finite_are_refused():
     data[3, 1, 2] = np.nan
     with pytest.raises(ValueError, match="not finite"):
         pod(data, Euclidean(), FLUID)
+
+
+def test_a_basis_says_what_it_holds():
+    basis = pod(snapshots(), Euclidean(), FLUID, 5)
+    energy = cumulative_energy(basis.singular_values)[4]
+    count = len(basis.singular_values)
+    for shown in (repr(basis), basis._repr_html_()):
+        for told in (f"5 of {count}", "40 in 2D", f"{energy:.6g} %"):
+            assert told in shown
+    assert "\n" not in repr(basis)

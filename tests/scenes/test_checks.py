@@ -26,7 +26,7 @@ def box_of_fluid(dtype=jnp.float64, origin=0.0, density=1000.0, number=float, st
     walls = Walls.around(~body, space)
     position = Lattice().positions(space)
     position = position[np.asarray(body.signed_distance(position)) > 0.25 * DX]
-    effects = DeltaPlus().effects(jnp.zeros(()).dtype, number(0.01), vessel=~body)
+    effects = DeltaPlus().effects(number(0.01), vessel=~body)
     effects = (*effects, Gravity(np.asarray([0.1, 0.0])))
     state = ParticleState(
         jnp.asarray(position, dtype),

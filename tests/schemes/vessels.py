@@ -27,7 +27,7 @@ def vessel(side, dim=2, *, periodic=False, jitter=0.2, h_over_dx=2.0, kernel=Non
         inside = np.asarray(region.signed_distance(Lattice().positions(space))) < 0.0
         position = position[inside]
     scheme = Consistent() if scheme is None else scheme
-    effects = scheme.effects(dtype, viscosity, force, None if periodic else region)
+    effects = scheme.effects(viscosity, force, None if periodic else region)
     state = ParticleState(position, 0.0 * position, jnp.ones(len(position)))
     limit = 1.0 if viscosity is None else max(1.0, 8.0 * viscosity / SOUND / h_over_dx)
     steps = max(1, round(end_time * SOUND / h_over_dx * limit))

@@ -42,7 +42,7 @@ def scene(box, region=None, scheme=None, arrangement=None, gravity=None, keep=No
     if gravity is not None:
         force = Gravity(jnp.zeros(box.dim).at[1].set(-gravity))
         pressure = 1000.0 * gravity * (box.upper[1] - position[:, 1])
-    effects = scheme.effects(jnp.zeros(()).dtype, 0.02, force, region)
+    effects = scheme.effects(0.02, force, region)
     state = ParticleState(position, jnp.zeros_like(position), 1000.0 + pressure / 100.0)
     fluid = Fluid(1000.0, 10.0, 1.0)
     return Scene("still", effects, fluid, space, state, 0.01, 0.01 * steps, 10, walls=walls)

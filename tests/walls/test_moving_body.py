@@ -246,7 +246,7 @@ def ball_scene(end_time):
     x = fill(walls.start_region, Lattice().positions(space))
     state = ParticleState(x, jnp.zeros_like(x), jnp.full(len(x), 1000.0))
     effects = (
-        *delta_plus(jnp.float64, LaminarViscosity(jnp.asarray(0.05))),
+        *delta_plus(LaminarViscosity(jnp.asarray(0.05))),
         WallPressure(),
         NoSlip(),
         WallRepulsion(room),
