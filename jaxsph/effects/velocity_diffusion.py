@@ -23,12 +23,12 @@ class VelocityDiffusion(Effect):
         du_i/dt = rho0/rho_i 2 delta h c0 c_i sum_j c_j
             [(u_j - u_i) . x_ij - x_ij . (S_i + S_j) x_ij / 2] grad_i W_ij / r^2 V_j,
 
-    x_ij = x_j - x_i, S the symmetric part of the velocity's gradient: Monaghan's artificial viscosity of what a
-    linear reconstruction from either side leaves (as in Vila 1999), the counterpart of
-    `DensityDiffusion` for velocity. Linear fields, rotation among them, do not feel it; noise from
-    particle to particle decays within some h / (delta c0), and waves lose little to it.
-    c (`coherent`, of `FreeSurface` before it) spares particles that fly alone. It conserves linear
-    and angular momentum. Needs `KernelCorrection`.
+    x_ij = x_j - x_i, S the symmetric part of the velocity's gradient: Monaghan's artificial
+    viscosity of what a linear reconstruction from either side leaves (as in Vila 1999), the
+    counterpart of `DensityDiffusion` for velocity. Linear fields, rotation among them, do not feel
+    it; noise from particle to particle decays within some h / (delta c0), and waves lose little to
+    it. c (`coherent`, of `FreeSurface` before it) spares particles that fly alone. It conserves
+    linear and angular momentum. Needs `KernelCorrection`.
 
     Args:
         delta: strength.
