@@ -10,7 +10,6 @@ if it has made it: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -19,11 +18,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph import SimulationError
-from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
-from jaxsph.io import check_target
 from jaxsph.scenes import lid_driven_cavity
 from jaxsph_rom import (
     ConsistentAdvection,
@@ -37,6 +34,7 @@ from jaxsph_rom import (
 from jaxsph_rom.study import PLANS, Outcome
 
 from .measure import Clocked, format_rows, number, summary, write_json
+from .table import command
 
 REYNOLDS = 100.0
 CHOICES = tuple(product(
@@ -48,35 +46,21 @@ CHOICES = tuple(product(
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: the full run failed, 2: bad input."""
-    return report_errors("cavity_options", _command, argv)
+    return command("cavity_options", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        try:
-            results = {"rows": list(_rows(options)), "environment": environment()}
-        except SimulationError as error:
-            return fail("cavity_options", f"full model: {error}", 1)
+def _run(options) -> None:
+    results = {"rows": list(_rows(options)), "environment": environment()}
     write_json(options.json, results)
     print(_table(results["rows"]))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.cavity_options", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, metavar="N", help="instead of the small scale's")
     add("--end-time", type=positive_float, default=10.0, metavar="T", help="[s] (default: 10)")
     add("--modes", type=positive_int, default=10, metavar="M", help="default: %(default)s")
     add("--out", type=Path, default=Path("out/paper-rom-lid-driven-cavity-small"), metavar="DIR",
         help="where runs are kept (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/cavity_options.json"), metavar="FILE",
-        help="default: %(default)s")  # fmt: skip
-    return parser
 
 
 def _rows(options):

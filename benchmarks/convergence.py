@@ -8,12 +8,10 @@ finished run's row is in the JSON file at once; the same command goes on where i
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import math
 import time as clock
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -21,10 +19,9 @@ import numpy as np
 
 from jaxsph import SimulationError, Trajectory, simulate
 from jaxsph.arrangements import Lattice
-from jaxsph.cli import ARRANGEMENTS, positive_float, positive_int, report_errors
+from jaxsph.cli import ARRANGEMENTS, positive_float, positive_int
 from jaxsph.effects import ParticleShifting, ShiftingTransport
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph.scenes.taylor_green_solution import kinetic_energy as exact_energy
@@ -34,11 +31,9 @@ from .measure import (
     interacting_pairs,
     number,
     progress,
-    read_json,
     summary,
-    tell,
-    write_json,
 )
+from .table import Table, command
 
 SNAPSHOTS = 20  # of a run: enough to see the largest drift, and times of as many parts
 ERRORS = ("kinetic_energy_error", "velocity_error", "pressure_error")
@@ -53,41 +48,23 @@ MASS_CHECK = (
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("convergence", _command, argv)
+    return command("convergence", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    if any(name not in row for row in rows for name in KEY):
-        raise ValueError(f"{options.json}: holds other results; name another file.")
-    done = {tuple(row[name] for name in KEY) for row in rows}
+def _run(options) -> None:
+    kept = Table(options.json, KEY, beside=_beside)
     wanted = [dict(zip(KEY, values, strict=True)) for values in _cases(options)]
-    for case in wanted:
-        name = ", ".join(f"{key} {value}" for key, value in case.items())
-        if tuple(case.values()) in done:
-            tell(f"done before: {name}")
-            continue
-        tell(name)
+    for case in kept.left(wanted):
         with jax.enable_x64(case["precision"] == "float64"):
-            rows.append(case | run(case))
-        write_json(options.json, _results(rows))
-    write_json(options.json, _results(rows))
-    keys = [tuple(case.values()) for case in wanted]
-    shown = [row for row in rows if tuple(row[name] for name in KEY) in keys]
+            kept.add(case | run(case))
+    shown = [row for row in kept.rows if {name: row[name] for name in KEY} in wanted]
     print(_table(shown))
     for order in _orders(shown):
         slopes = ", ".join(f"{name} {number(order[name])}" for name in ERRORS)
         print(f"order, {order['precision']}, {order['arrangement']}: {slopes}")
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.convergence", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[25, 50, 100], metavar="N",
         help="particles per side (default: 25 50 100)")  # fmt: skip
     add("--h-over-dx", type=positive_float, default=2.0, metavar="X", help="default: %(default)g")
@@ -99,9 +76,6 @@ def _parser() -> argparse.ArgumentParser:
         help="default: float64")  # fmt: skip
     add("--skip-without-shifting", action="store_true",
         help="leave out the runs without the two shifting effects")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/convergence.json"), metavar="FILE",
-        help="results, and what is done already (default: %(default)s)")  # fmt: skip
-    return parser
 
 
 def _cases(options):
@@ -243,8 +217,8 @@ def _orders(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return orders
 
 
-def _results(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    return {"orders": _orders(rows), "rows": rows, "environment": environment()}
+def _beside(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    return {"orders": _orders(rows), "environment": environment()}
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -9,17 +9,15 @@ not computed.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from pathlib import Path
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import matplotlib
 
 from jaxsph.arrangements import JitteredLattice
-from jaxsph.cli import positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.effects import (
     ArtificialViscosity,
     BackgroundPressure,
@@ -53,8 +51,8 @@ from .measure import (
     tell,
     write_json,
 )
+from .table import command
 
-RESULTS = Path("benchmarks/results/effect_cost.json")
 FIGURE = Path("docs/figures/effect_cost.png")
 
 
@@ -81,32 +79,22 @@ def ladder() -> list[tuple[Effect, tuple[Effect, ...]]]:
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("effect_cost", _command, argv)
+    return command("effect_cost", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    for path in (options.json, options.figure):
-        check_target(path, overwrite=True)
-    with jax.enable_x64(True):
-        results = measured(options.resolution, options.h_over_dx, options.repeats)
+def _run(options) -> None:
+    check_target(options.figure)
+    results = measured(options.resolution, options.h_over_dx, options.repeats)
     write_json(options.json, results | environment())
     draw(results["rows"], options.figure)
     print(_table(results["rows"]))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.effect_cost", description=__doc__.partition("\n")[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, default=100, metavar="N", help="default: 100")
     add("--h-over-dx", type=positive_float, default=2.0, metavar="X", help="default: 2")
     add("--repeats", type=positive_int, default=15, metavar="K", help="default: 15")
-    add("--json", type=Path, default=RESULTS, metavar="FILE", help=f"default: {RESULTS}")
     add("--figure", type=Path, default=FIGURE, metavar="FILE", help=f"default: {FIGURE}")
-    return parser
 
 
 def measured(resolution: int, h_over_dx: float, repeats: int) -> dict[str, Any]:

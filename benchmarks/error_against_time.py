@@ -23,9 +23,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
 from jaxsph.plotting.style import (
     BLACK,
@@ -43,6 +42,7 @@ from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell, write_json
+from .table import command
 from .tensor_rom import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 
 REYNOLDS = 175.0
@@ -55,29 +55,24 @@ _REPEATS = 9
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("error_against_time", _command, argv)
+    return command(
+        "error_against_time",
+        __doc__,
+        _arguments,
+        _run,
+        argv,
+        json="error_against_time_{scale}.json",
+    )
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"error_against_time_{options.scale}.json")
-    check_target(path, overwrite=True)
-    with jax.enable_x64(True):
-        try:
-            results = _measured(options)
-        except SimulationError as error:
-            return fail("error_against_time", f"full model: {error}", 1)
-    write_json(path, results)
+def _run(options) -> None:
+    results = _measured(options)
+    write_json(options.json, results)
     figure(results["rows"], options.figure)
     print(_table(results))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.error_against_time", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -92,11 +87,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--skip-moving", action="store_true", help="leave out the models on moving particles")
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/error_against_time_SCALE.json")  # fmt: skip
     add("--figure", type=Path, default=Path("docs/figures/error_against_time.png"), metavar="FILE",
         help="default: %(default)s")  # fmt: skip
-    return parser
 
 
 def _measured(options) -> dict[str, Any]:

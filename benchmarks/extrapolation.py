@@ -9,7 +9,6 @@ centre line stand for both parts of time apart, beside those of the projection o
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import time as clock
 from pathlib import Path
@@ -19,16 +18,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph import Trajectory
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line
 from jaxsph.scenes import Scene
 from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, write_json
+from .table import command
 from .tensor_rom import HELD_BACK, PREDICTED, TRAINED_ON, discrepancies, make_scene, profile_of
 
 _FIELDS = ("time", "position", "velocity", "density", "pressure")
@@ -37,14 +36,12 @@ _PARTS = ("trained", "beyond")
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("extrapolation", _command, argv)
-
-
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.extrapolation", description=__doc__.splitlines()[0]
+    return command(
+        "extrapolation", __doc__, _arguments, _run, argv, json="extrapolation_{scale}.json"
     )
-    add = parser.add_argument
+
+
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -58,21 +55,14 @@ def _command(argv) -> int:
         help="of the closure's training (default: %(default)s)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/extrapolation_SCALE.json")  # fmt: skip
-    options = parser.parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"extrapolation_{options.scale}.json")
-    check_target(path, overwrite=True)
+
+
+def _run(options) -> None:
     if not options.until < options.end_time:
         raise ValueError(f"--until: must be below the end time of {options.end_time:g} s.")
-    with jax.enable_x64(True):
-        try:
-            results = _measured(options)
-        except SimulationError as error:
-            return fail("extrapolation", f"full model: {error}", 1)
-    write_json(path, results)
+    results = _measured(options)
+    write_json(options.json, results)
     print(_table(results))
-    return 0
 
 
 def _measured(options) -> dict[str, Any]:

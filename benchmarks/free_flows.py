@@ -14,20 +14,17 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from scipy.optimize import curve_fit
 from scipy.spatial import cKDTree
 
 from jaxsph import SimulationError, Trajectory, run_scene
-from jaxsph.cli import positive_int, report_errors
+from jaxsph.cli import positive_int
 from jaxsph.effects import FreeSlip
 from jaxsph.environment import environment
 from jaxsph.integrate import AutomaticSteps, FixedSteps
-from jaxsph.io import check_target
 from jaxsph.scenes import SCENES, Scene
 from jaxsph.scenes.dam_break import GRAVITY, dam_break
 from jaxsph.scenes.elliptic_drop import semi_axes
@@ -36,7 +33,7 @@ from jaxsph.scenes.piston_wave_maker import wave_height, wave_number
 from jaxsph.scenes.standing_wave import damping
 from jaxsph.schemes import SCHEMES, Scheme
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress
 from .references.dam_break import (
     FRONT,
     FRONT_TIME,
@@ -45,8 +42,9 @@ from .references.dam_break import (
     SENSOR_TANK,
     SENSOR_TIME,
 )
+from .table import Table, command
 
-RESULTS = Path("benchmarks/results/free_flows.json")
+KEY = ("scene", "resolution", "scheme")
 IMPACT_HEIGHT = 0.6  # m, H of Buchner's column
 STEPPING = {"dam-break-impact": AutomaticSteps()}  # jets are faster than fixed steps allow for
 RESOLUTIONS = {
@@ -64,40 +62,31 @@ RESOLUTIONS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("free_flows", _command, argv)
+    return command("free_flows", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    for row in rows:
+def _run(options) -> None:
+    kept = Table(options.json, KEY[:2], beside=lambda rows: environment())
+    for row in kept.rows:
         row.setdefault("scheme", "delta-plus")  # there was no other
-    done = {(row["scene"], row["resolution"], row["scheme"]) for row in rows}
-    with jax.enable_x64(True):
-        for name in options.scenes:
-            sizes, schemes = options.resolutions or RESOLUTIONS[name], _schemes(name, options)
-            for key in ((name, size, scheme) for size in sizes for scheme in schemes):
-                if key not in done:
-                    tell("{}, resolution {}, {}".format(*key))
-                    rows.append(run(*key))
-                    write_json(options.json, {"rows": rows, **environment()})
-    print(_table(rows))
-    return 0
+    for case in kept.left(_cases(options)):
+        kept.add(run(*case.values()))
+    print(_table(kept.rows))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.free_flows", description=__doc__.partition("\n")[0]
-    )
-    add = parser.add_argument
+def _cases(options):
+    for name in options.scenes:
+        for size in options.resolutions or RESOLUTIONS[name]:
+            for scheme in _schemes(name, options):
+                yield dict(zip(KEY, (name, size, scheme), strict=True))
+
+
+def _arguments(add) -> None:
     names = tuple(RESOLUTIONS)
     add("--scenes", nargs="+", choices=names, default=names, help="default: all")
     add("--resolutions", nargs="+", type=positive_int, metavar="N", help="default: two per scene")
     add("--schemes", nargs="+", choices=tuple(SCHEMES), default=tuple(SCHEMES),
         help="default: all that a scene has")  # fmt: skip
-    add("--json", type=Path, metavar="FILE", default=RESULTS, help=f"default: {RESULTS}")
-    return parser
 
 
 def _make(name: str) -> Callable[..., Scene]:

@@ -10,28 +10,23 @@ short.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.spatial import cKDTree
 
 from jaxsph import Box, BoxRegion, Fluid, ParticleState, SimulationError, Space, Walls, run_scene
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.cli import report_errors
 from jaxsph.effects import Gravity, LaminarViscosity
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene, dam_break
 from jaxsph.schemes import SCHEMES, Scheme
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress
+from .table import Table, command
 
-RESULTS = Path("benchmarks/results/free_surfaces.json")
 SETS: dict[str, list[dict[str, Any]]] = {
     "still": [
         {"kind": "still", "dim": dim, "deep": deep, "h_over_dx": width, "jitter": jitter}
@@ -46,39 +41,29 @@ SETS: dict[str, list[dict[str, Any]]] = {
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("free_surfaces", _command, argv)
+    return command("free_surfaces", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.free_surfaces", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--sets", choices=tuple(SETS), nargs="+", default=list(SETS), help="default: all")
     add("--schemes", choices=tuple(SCHEMES), nargs="+", default=list(SCHEMES), help="default: all")
-    add("--json", type=Path, default=RESULTS, metavar="FILE",
-        help="results, and what is done already (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    with jax.enable_x64(True):
-        for case in (case for name in options.sets for case in SETS[name]):
-            for scheme in options.schemes:
-                key = {**case, "scheme": scheme}
-                if any(all(row.get(k) == v for k, v in key.items()) for row in rows):
-                    continue
-                tell(", ".join(f"{name} {value}" for name, value in key.items()))
-                rows.append({**key, **run(case, SCHEMES[scheme]), "environment": environment()})
-                write_json(options.json, {"rows": rows})
-    print(table(rows))
-    return 0
 
 
-def run(case: dict[str, Any], scheme: Scheme) -> dict[str, Any]:
+def _run(options) -> None:
+    kept = Table(options.json)
+    cases = [case for name in options.sets for case in SETS[name]]
+    keys = ({**case, "scheme": scheme} for case in cases for scheme in options.schemes)
+    for key in kept.left(keys):
+        kept.add({**key, **run(key), "environment": environment()})
+    print(table(kept.rows))
+
+
+def run(case: dict[str, Any]) -> dict[str, Any]:
     """Levels, speeds, densities and times of one run; what a lost one had until its fault."""
+    scheme = SCHEMES[case["scheme"]]
     if case["kind"] == "still":
-        scene, level = still_water(**{k: case[k] for k in case if k != "kind"}, scheme=scheme), 1.0
-        unit = 1.0
+        settings = {k: case[k] for k in case if k not in ("kind", "scheme")}
+        scene, level, unit = still_water(**settings, scheme=scheme), 1.0, 1.0
     else:
         scene = dam_break(case["along"], end_time=case["end"], scheme=scheme)
         (width, height), (length, _) = (scene.parameters[name] for name in ("column", "tank"))

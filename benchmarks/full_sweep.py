@@ -9,7 +9,6 @@ run, relative to the field's largest value, must be round-off.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from pathlib import Path
 from typing import Any
@@ -19,44 +18,37 @@ import numpy as np
 
 from jaxsph import run_scene
 from jaxsph.arrangements import JitteredLattice
-from jaxsph.cli import positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph.sweeps import read_member, sweep
 
 from .measure import format_rows, number, progress, write_json
+from .table import command
 
 _FIELDS = ("position", "velocity", "density", "pressure")
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("full_sweep", _command, argv)
+    return command("full_sweep", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.full_sweep", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--members", type=positive_int, default=64, metavar="K", help="default: %(default)s")
     add("--side", type=positive_int, default=50, metavar="N", help="default: %(default)s")
     add("--end-time", type=positive_float, default=0.1, metavar="T", help="[s] (default: 0.1)")
     add("--devices", type=positive_int, default=8, metavar="D", help="default: %(default)s")
     add("--out", type=Path, default=Path("out/full-sweep/sweep.h5"), metavar="FILE",
         help="of the sweep; a killed one goes on (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/full_sweep.json"), metavar="FILE",
-        help="results (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
+
+
+def _run(options) -> None:
     if options.devices > 1:
         jax.config.update("jax_num_cpu_devices", options.devices)
-    with jax.enable_x64(True):
-        found = measured(members(options.members, options.side, options.end_time), options.out)
+    found = measured(members(options.members, options.side, options.end_time), options.out)
     write_json(options.json, found | {"environment": environment()})
     print(format_rows(("quantity", "value"), [(k, number(v)) for k, v in found.items()]))
-    return 0
 
 
 def members(count: int, side: int, end_time: float) -> list[Scene]:

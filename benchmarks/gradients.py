@@ -13,11 +13,9 @@ number of steps. What is in the file already is not done again.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -27,10 +25,9 @@ import numpy as np
 
 from jaxsph import COMPILER_OPTIONS, run_scene
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.cli import positive_int, report_errors
+from jaxsph.cli import positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, integrate
-from jaxsph.io import check_target
 from jaxsph.scenes import Scene, lid_driven_cavity, taylor_green
 from jaxsph_rom import (
     ConsistentAdvection,
@@ -48,11 +45,10 @@ from .measure import (
     format_rows,
     number,
     progress,
-    read_json,
     summary,
     tell,
-    write_json,
 )
+from .table import Table, command
 
 PARAMETERS = ("viscosity", "velocity amplitude", "positions")
 DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)  # the parameters are of order one
@@ -92,39 +88,33 @@ class Flow:
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("gradients", _command, argv)
+    return command("gradients", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.gradients", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--side", type=positive_int, default=45, metavar="N", help="default: %(default)s")
     add("--steps", type=positive_int, default=200, metavar="K", help="default: %(default)s")
     add("--cost-steps", type=positive_int, nargs="+", default=[100, 200, 1000], metavar="K",
         help="runs whose cost is measured (default: 100 200 1000)")  # fmt: skip
     add("--repeats", type=positive_int, default=3, metavar="K", help="default: %(default)s")
-    add("--json", type=Path, default=Path("benchmarks/results/gradients.json"), metavar="FILE",
-        help="results (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        settings = {"side": options.side, "steps": options.steps}
-        results = read_json(options.json) or {"settings": settings, "accuracy": [], "cost": []}
-        if results.get("settings") != settings:
-            raise ValueError(f"{options.json}: was made with other settings; name another file.")
-        results |= {"environment": environment()}
-        shorter = min(options.steps, _REDUCED_STEPS)
-        runs = ((periodic, options.steps), (walled, options.steps), (reduced, shorter))
-        for make, steps in runs[len(results["accuracy"]) :]:
-            results["accuracy"].append(accuracy(make(options.side), steps))
-            write_json(options.json, results)
-        for steps in options.cost_steps[len(results["cost"]) :]:
-            results["cost"].append(cost(periodic(options.side), steps, options.repeats))
-            write_json(options.json, results)
-    print(_table(results))
-    return 0
+
+
+def _run(options) -> None:
+    settings = {"side": options.side, "steps": options.steps}
+    kept = Table(options.json, settings=settings, beside=_beside, rows="accuracy")
+    costs = kept.results.setdefault("cost", [])
+    shorter = min(options.steps, _REDUCED_STEPS)
+    runs = ((periodic, options.steps), (walled, options.steps), (reduced, shorter))
+    for make, steps in runs[len(kept.rows) :]:
+        kept.add(accuracy(make(options.side), steps))
+    for steps in options.cost_steps[len(costs) :]:
+        costs.append(cost(periodic(options.side), steps, options.repeats))
+        kept.write()
+    print(_table(kept.results))
+
+
+def _beside(rows) -> dict[str, Any]:
+    return {"environment": environment()}
 
 
 def periodic(side: int) -> Flow:

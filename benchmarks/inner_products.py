@@ -10,7 +10,6 @@ the rest of velocity; they are the same in either product. Runs are kept in a fo
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -19,12 +18,10 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph import SimulationError
 from jaxsph.arrangements import Lattice
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
-from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 from jaxsph_rom import (
     Basis,
@@ -41,7 +38,8 @@ from jaxsph_rom import (
 from jaxsph_rom.hyper import ReducedFlow, galerkin_system, mapped_run
 from jaxsph_rom.study import full_run
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress, tell
+from .table import Table, command
 from .tensor_rom import judged, make_scene, profile_of
 
 REYNOLDS = 100.0
@@ -52,28 +50,12 @@ KEY = ("product", "centring", "cutoff", "modes")
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: the full run failed, 2: bad input."""
-    return report_errors("inner_products", _command, argv)
-
-
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"inner_products_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("inner_products", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.inner_products", description=__doc__.splitlines()[0]
+    return command(
+        "inner_products", __doc__, _arguments, _run, argv, json="inner_products_{scale}.json"
     )
-    add = parser.add_argument
+
+
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the run (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -83,42 +65,27 @@ def _parser() -> argparse.ArgumentParser:
         help="of the low-pass [Hz] (default: c0 / 2 L)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where the run is kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/inner_products_SCALE.json")  # fmt: skip
-    return parser
 
 
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
+def _run(options) -> None:
     settings = {
         name: getattr(options, name) for name in ("scale", "resolution", "end_time", "cutoff")
     }
-    found = read_json(path) or {"settings": settings, "rows": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
-
-
-def _run(path: Path, results: dict[str, Any], options) -> None:
+    kept = Table(options.json, KEY, settings=settings)
     scene = make_scene(options, REYNOLDS)
     cutoff = options.cutoff or float(scene.fluid.sound_speed) / (2 * max(scene.space.box.lengths))
-    done = {tuple(row[name] for name in KEY) for row in results["rows"]}
     groups = list(product(PRODUCTS, CENTRINGS, (None, cutoff)))
-    left = [g for g in groups if any((*g, modes) not in done for modes in options.modes)]
+    left = [g for g in groups if not all(kept.has((*g, modes)) for modes in options.modes)]
     if not left:
         tell("all done before")
-        return
+        return print(_table(kept.results))
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     run = full_run(folder / "full", scene, progress)
     reference = ReferenceSpace(Lattice().positions(scene.space), scene.space, MovingLeastSquaresMap)
     mapped = mapped_run(reference, run, scene.fluid)
     smooth = low_pass(mapped, run.time, cutoff)
     truth = profile_of(scene, run)
-    results |= {
+    kept.results |= {
         "reynolds": REYNOLDS,
         "particles": run.particles,
         "snapshots": len(run.time),
@@ -131,12 +98,12 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             snapshots = mapped if filtered is None else smooth
             for modes, flow in _flows(scene, reference, snapshots, name, centring, options.modes):
                 key = (name, centring, filtered, modes)
-                if key not in done:
+                if not kept.has(key):
                     projected = np.asarray(flow.project(mapped))  # from where the full run starts
                     row = dict(zip(KEY, key, strict=True))
-                    results["rows"].append(row | judged(flow, scene, run, projected, truth))
-                    write_json(path, results)
+                    kept.add(row | judged(flow, scene, run, projected, truth))
             report(1)
+    print(_table(kept.results))
 
 
 def _flows(

@@ -12,7 +12,6 @@ has made them, and finished rows stay in the JSON file: the same command goes on
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from collections.abc import Callable
 from functools import partial
@@ -25,10 +24,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph_rom.hyper import QuadraticSystem, mapped_run, rollout
 from jaxsph_rom.hyper.adaptive import solve
@@ -40,11 +37,10 @@ from .measure import (
     format_rows,
     number,
     progress,
-    read_json,
     summary,
     tell,
-    write_json,
 )
+from .table import Table, command
 from .tensor_rom import TRAINED_ON, make_scene, train
 
 SOLVERS = {
@@ -61,28 +57,12 @@ _REPEATS = 20
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("larger_steps", _command, argv)
-
-
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"larger_steps_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("larger_steps", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.larger_steps", description=__doc__.splitlines()[0]
+    return command(
+        "larger_steps", __doc__, _arguments, _run, argv, json="larger_steps_{scale}.json"
     )
-    add = parser.add_argument
+
+
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -94,30 +74,16 @@ def _parser() -> argparse.ArgumentParser:
         help="RK4's steps over the full model's (default: 1 2 4 8 16)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/larger_steps_SCALE.json")  # fmt: skip
-    return parser
 
 
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
+def _run(options) -> None:
     names = ("scale", "resolution", "end_time", "reynolds", "factors")
     settings = {name: getattr(options, name) for name in names}
-    found = read_json(path) or {"settings": settings, "rows": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
-
-
-def _run(path: Path, results: dict[str, Any], options) -> None:
-    left = [m for m in options.modes if m not in {row["modes"] for row in results["rows"]}]
+    kept = Table(options.json, ("modes",), settings=settings)
+    left = [m for m in options.modes if not kept.has({"modes": m})]
     if not left:
         tell("all done before")
-        return
+        return print(_table(kept.results))
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     scenes = {re: make_scene(options, re) for re in sorted({*TRAINED_ON, options.reynolds})}
     scene = scenes[options.reynolds]
@@ -137,7 +103,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
     line = centre_line(scene.space)
     truth = tuple(a[judged][1:] for a in probe(run, line, scene.space))
     time = run.time[judged][1:]
-    results |= {
+    kept.results |= {
         "particles": run.particles,
         "parameters": scene.parameters,
         "trained_on": TRAINED_ON,
@@ -157,8 +123,9 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
                 float(relative_discrepancy(a, b).max()) for a, b in zip(truth, found, strict=True)
             ]
 
-        results["rows"] += _measured(part, part.project(first), scene, options, time, percent)
-        write_json(path, results)
+        kept.rows.extend(_measured(part, part.project(first), scene, options, time, percent))
+        kept.write()
+    print(_table(kept.results))
 
 
 def _measured(flow, start, scene, options, time, percent) -> list[dict[str, Any]]:

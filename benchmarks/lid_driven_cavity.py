@@ -11,7 +11,6 @@ kept in a folder and finished rows in the JSON file: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -20,16 +19,15 @@ import jax
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import report_errors
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import local_quadratic
 from jaxsph.scenes import Scene, continued, lid_driven_cavity
 from jaxsph_rom.study import full_run, with_record
 
-from .measure import format_rows, near_walls, number, progress, read_json, tell, write_json
+from .measure import format_rows, near_walls, number, progress, tell
 from .references import ghia
 from .references.lid_driven_cavity import constant_lid, regularised_lid, solve
+from .table import Table, command
 
 LIDS = {"constant": constant_lid, "regularised": regularised_lid}
 SNAPSHOTS_PER_SECOND = 5
@@ -54,48 +52,32 @@ KEY = ("lid", "reynolds", "resolution", "before", "end_time")
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a run failed, 2: bad input."""
-    return report_errors("lid_driven_cavity", _command, argv)
+    return command("lid_driven_cavity", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    if any(name not in row for row in rows for name in KEY):
-        raise ValueError(f"{options.json}: holds other results; name another file.")
-    done, failed = {tuple(row[name] for name in KEY) for row in rows}, False
-    with jax.enable_x64(True):
-        for name in options.cases:
-            for values in SETS[name]:
-                if values in done:
-                    continue
-                case = dict(zip(KEY, values, strict=True))
-                tell(", ".join(f"{key} {value}" for key, value in case.items()))
-                try:
-                    row = case | run(case, options.out)
-                except SimulationError as error:
-                    tell(f"failed: {error}")
-                    row, failed = case | {"fault": str(error)}, True
-                rows.append(row)
-                done.add(values)
-                write_json(options.json, {"rows": rows, "environment": environment()})
-    print(_table(rows))
-    return int(failed)
+def _run(options) -> bool:
+    kept, failed = Table(options.json, KEY, beside=_beside), False
+    cases = (dict(zip(KEY, values, strict=True)) for name in options.cases for values in SETS[name])
+    for case in kept.left(cases):
+        try:
+            row = run(case, options.out)
+        except SimulationError as error:
+            tell(f"failed: {error}")
+            row, failed = {"fault": str(error)}, True
+        kept.add(case | row)
+    print(_table(kept.rows))
+    return failed
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.lid_driven_cavity", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _beside(rows) -> dict[str, Any]:
+    return {"environment": environment()}
+
+
+def _arguments(add) -> None:
     add("--cases", choices=tuple(SETS), nargs="+", default=list(SETS),
         help="sets of cases (default: all)")  # fmt: skip
     add("--out", type=Path, default=Path("out/lid-driven-cavity"), metavar="DIR",
         help="where runs are kept (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/lid_driven_cavity.json"),
-        metavar="FILE",
-        help="results, and what is done already (default: %(default)s)")  # fmt: skip
-    return parser
 
 
 def make_scene(case: dict[str, Any], step: float | None = None) -> Scene:

@@ -11,16 +11,13 @@ the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Any
 
 import jax
 
-from jaxsph import SimulationError
-from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import (
     AdjointPetrovGalerkin,
@@ -33,7 +30,8 @@ from jaxsph_rom import (
 from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.study import PLANS
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress, tell
+from .table import Table, command
 
 REYNOLDS = 100.0
 CONSTANTS = (0.2, 0.02, 0.002)
@@ -42,29 +40,12 @@ KEY = ("inner_product", "modes", "rule")
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("memory_length", _command, argv)
-
-
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    name = f"memory_length_{options.resolution}.json"
-    path = options.json or Path("benchmarks", "results", name)
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("memory_length", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.memory_length", description=__doc__.splitlines()[0]
+    return command(
+        "memory_length", __doc__, _arguments, _run, argv, json="memory_length_{resolution}.json"
     )
-    add = parser.add_argument
+
+
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, default=32, metavar="N",
         help="particles per side (default: %(default)s)")  # fmt: skip
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -76,22 +57,6 @@ def _parser() -> argparse.ArgumentParser:
         help="of POD and projection (default: both)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/memory-length)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/memory_length_RESOLUTION.json")  # fmt: skip
-    return parser
-
-
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
-    settings = {"resolution": options.resolution, "end_time": options.end_time}
-    found = read_json(path) or {"settings": settings, "cases": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
 
 
 def _rules(constants) -> dict[str, Any]:
@@ -104,8 +69,9 @@ def _rules(constants) -> dict[str, Any]:
     return rules
 
 
-def _run(path: Path, results: dict[str, Any], options) -> None:
-    done = {tuple(case[name] for name in KEY) for case in results["cases"]}
+def _run(options) -> None:
+    settings = {"resolution": options.resolution, "end_time": options.end_time}
+    kept = Table(options.json, KEY, settings=settings, rows="cases")
     rules = _rules(options.constants)
 
     def make(reynolds):
@@ -119,23 +85,24 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             product=PRODUCTS[product](), progress=progress,
         )  # fmt: skip
         for modes in options.modes:
-            left = [name for name in rules if (product, modes, name) not in done]
+            left = [name for name in rules if not kept.has((product, modes, name))]
             if not left:
                 tell(f"done before: {product}, M = {modes}")
                 continue
             study.projections = tuple(rules[name] for name in left)
             experiment = Experiment((REYNOLDS,), (REYNOLDS,), (modes,))
             for name, outcome in zip(left, study.run(experiment), strict=True):
-                results["cases"].append(outcome.case.to_dict() | {"rule": name})
-                results["cases"].sort(key=lambda case: (case["inner_product"], case["modes"]))
-                results |= {
+                kept.rows.append(outcome.case.to_dict() | {"rule": name})
+                kept.rows.sort(key=lambda case: (case["inner_product"], case["modes"]))
+                kept.results |= {
                     "particles": outcome.trajectory.particles,
                     "parameters": study.scene(REYNOLDS).parameters,
                     "step": study.scene(REYNOLDS).time_step,
                     "device": jax.devices()[0].device_kind,
                     "environment": environment(),
                 }
-                write_json(path, results)
+                kept.write()
+    print(_table(kept.results))
 
 
 def _table(results: dict[str, Any]) -> str:

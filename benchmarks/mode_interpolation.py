@@ -11,7 +11,6 @@ has made it.
 
 from __future__ import annotations
 
-import argparse
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,16 +20,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError
-from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
-from jaxsph.io import check_target
 from jaxsph.scenes import lid_driven_cavity
 from jaxsph_rom import Energy, LatticePolynomials, LocalSplines, ReferenceSpace, pod
 from jaxsph_rom.study import full_run
 
 from .measure import alternate, format_rows, number, progress, summary, write_json
+from .table import command
 
 REYNOLDS = 100.0
 RULES = tuple((LocalSplines, k) for k in (1, 3, 5)) + tuple(
@@ -42,36 +40,22 @@ _JUDGED = 10  # snapshots
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: the full run failed, 2: bad input."""
-    return report_errors("mode_interpolation", _command, argv)
+    return command("mode_interpolation", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        try:
-            results = _measured(options)
-        except SimulationError as error:
-            return fail("mode_interpolation", f"full model: {error}", 1)
+def _run(options) -> None:
+    results = _measured(options)
     write_json(options.json, results)
     print(_table(results))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.mode_interpolation", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, metavar="N", help="instead of the small scale's")
     add("--end-time", type=positive_float, default=10.0, metavar="T", help="[s] (default: 10)")
     add("--modes", type=positive_int, nargs="+", default=[10, 30], metavar="M",
         help="default: 10 30")  # fmt: skip
     add("--out", type=Path, default=Path("out/paper-rom-lid-driven-cavity-small"), metavar="DIR",
         help="where the run is kept (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/mode_interpolation.json"),
-        metavar="FILE", help="default: %(default)s")  # fmt: skip
-    return parser
 
 
 def _measured(options) -> dict[str, Any]:

@@ -12,7 +12,6 @@ walls.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -21,17 +20,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import fail, positive_float, positive_int, report_errors
+from jaxsph import Trajectory
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.effects import LaminarViscosity
 from jaxsph.environment import environment
 from jaxsph.interpolation import ShepardMap
-from jaxsph.io import check_target
 from jaxsph.scenes import Scene, open_cavity
 from jaxsph.scenes.open_cavity import CAVITY_LENGTH, CHANNEL_HEIGHT
 from jaxsph_rom.study import full_run
 
 from .measure import near_walls, number, progress, write_json
+from .table import command
 
 PROBE = (0.25, 0.0)  # m, in the mouth of the cavity, on the paper's slice
 SNAPSHOTS_PER_SECOND = 50
@@ -41,29 +40,17 @@ _SETTLED = 0.01  # relative change of the mean kinetic energy from period to per
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: the run failed, 2: bad input."""
-    return report_errors("open_cavity", _command, argv)
+    return command("open_cavity", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        scene = _scene(options)
-        try:
-            trajectory = full_run(options.out, scene, progress)
-        except SimulationError as error:
-            return fail("open_cavity", str(error), 1)
-        results = measure(scene, trajectory)
+def _run(options) -> None:
+    scene = _scene(options)
+    results = measure(scene, full_run(options.out, scene, progress))
     write_json(options.json, results)
     print(_text(results))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.open_cavity", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, default=100, metavar="N",
         help="particles per 0.4 m (default: %(default)s, a quarter of the paper's)")  # fmt: skip
     add("--reynolds", type=positive_float, default=2400.0, metavar="RE",
@@ -72,9 +59,6 @@ def _parser() -> argparse.ArgumentParser:
         help="[s] (default: %(default)g)")  # fmt: skip
     add("--out", type=Path, default=Path("out/open-cavity"), metavar="DIR",
         help="where the run is kept (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/open_cavity.json"), metavar="FILE",
-        help="default: %(default)s")  # fmt: skip
-    return parser
 
 
 def _scene(options) -> Scene:

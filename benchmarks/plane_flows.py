@@ -9,9 +9,7 @@ JSON file at once; the same command goes on where it was cut short.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -19,16 +17,16 @@ import numpy as np
 
 from jaxsph import Trajectory, run_scene
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.cli import positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.effects import FixedWallVelocity, NoSlip
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import Scene, couette, hydrostatic_tank, poiseuille
 from jaxsph.scenes import plane_flow_solution as exact
 from jaxsph.scenes.hydrostatic_tank import GRAVITY, REFERENCE_DENSITY, hydrostatic_pressure
 from jaxsph.schemes import DeltaPlus
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress, tell
+from .table import Table, command
 
 REYNOLDS = 10.0
 SNAPSHOTS = 40
@@ -39,34 +37,19 @@ WALLS = {"no-slip": NoSlip(), "fixed": FixedWallVelocity()}
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("plane_flows", _command, argv)
+    return command("plane_flows", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    if any(name not in row for row in rows for name in KEY):
-        raise ValueError(f"{options.json}: holds other results; name another file.")
-    done = {tuple(row[name] for name in KEY) for row in rows}
-    with jax.enable_x64(True):
-        for case in _cases(options):
-            if tuple(case.values()) not in done:
-                tell(", ".join(f"{key} {value}" for key, value in case.items()))
-                rows.append(case | run(case))
-                write_json(options.json, _results(rows))
-    write_json(options.json, _results(rows))
-    print(_table(rows))
-    for order in _orders(rows):
+def _run(options) -> None:
+    kept = Table(options.json, KEY, beside=_beside)
+    for case in kept.left(_cases(options)):
+        kept.add(case | run(case))
+    print(_table(kept.rows))
+    for order in _orders(kept.rows):
         tell(f"order: {order}")
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.plane_flows", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[25, 50, 100], metavar="N",
         help="particles across (default: 25 50 100)")  # fmt: skip
     add("--flows", choices=("couette", "poiseuille", "hydrostatic-tank"), nargs="+",
@@ -78,9 +61,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--layers", type=positive_int, nargs="+", default=[4], metavar="K",
         help="of ghosts; 4 fill the support at h = 2 dx (default: 4)")  # fmt: skip
     add("--h-over-dx", type=positive_float, default=2.0, metavar="X", help="default: 2")
-    add("--json", type=Path, default=Path("benchmarks/results/plane_flows.json"), metavar="FILE",
-        help="results, and what is done already (default: %(default)s)")  # fmt: skip
-    return parser
 
 
 def _cases(options):
@@ -208,8 +188,8 @@ def _orders(rows) -> list[dict[str, Any]]:
     return orders
 
 
-def _results(rows) -> dict[str, Any]:
-    return {"reynolds": REYNOLDS, "orders": _orders(rows), "rows": rows}
+def _beside(rows) -> dict[str, Any]:
+    return {"reynolds": REYNOLDS, "orders": _orders(rows)}
 
 
 def _table(rows) -> str:

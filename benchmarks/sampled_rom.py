@@ -11,7 +11,6 @@ command goes on.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from itertools import product
 from pathlib import Path
@@ -22,11 +21,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import Model, integrate
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
 from jaxsph_rom.hyper import (
     QDEIM,
@@ -41,7 +38,8 @@ from jaxsph_rom.hyper import (
 )
 from jaxsph_rom.study import full_run
 
-from .measure import format_rows, number, progress, read_json, tell, write_json
+from .measure import format_rows, number, progress, tell
+from .table import Table, command
 from .tensor_rom import TRAINED_ON, discrepancies, make_scene, train
 
 SELECTIONS = {"q-deim": QDEIM, "non-negative": NonNegativeWeights}
@@ -53,28 +51,10 @@ _STATES = 50  # of each run that the samples are chosen by
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("sampled_rom", _command, argv)
+    return command("sampled_rom", __doc__, _arguments, _run, argv, json="sampled_rom_{scale}.json")
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"sampled_rom_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("sampled_rom", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.sampled_rom", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -86,24 +66,6 @@ def _parser() -> argparse.ArgumentParser:
         help="numbers of samples beside M itself (default: 10 20 50 100)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/sampled_rom_SCALE.json")  # fmt: skip
-    return parser
-
-
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
-    settings = {
-        name: getattr(options, name) for name in ("scale", "resolution", "end_time", "reynolds")
-    }
-    found = read_json(path) or {"settings": settings, "offline": [], "rows": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
 
 
 def _wanted(options, modes: int) -> list[tuple[int, str, int | None]]:
@@ -112,12 +74,16 @@ def _wanted(options, modes: int) -> list[tuple[int, str, int | None]]:
     return cases + [(modes, name, count) for count, name in product(counts, SELECTIONS)]
 
 
-def _run(path: Path, results: dict[str, Any], options) -> None:
-    done = {tuple(row[name] for name in KEY) for row in results["rows"]}
-    left = {m: [c for c in _wanted(options, m) if c not in done] for m in options.modes}
+def _run(options) -> None:
+    settings = {
+        name: getattr(options, name) for name in ("scale", "resolution", "end_time", "reynolds")
+    }
+    kept = Table(options.json, KEY, settings=settings)
+    offline = kept.results.setdefault("offline", [])
+    left = {m: [c for c in _wanted(options, m) if not kept.has(c)] for m in options.modes}
     if not any(left.values()):
         tell("all done before")
-        return
+        return print(_table(kept.results))
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     scenes = {reynolds: make_scene(options, reynolds) for reynolds in TRAINED_ON}
     runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
@@ -125,7 +91,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
     largest = train(scene, list(runs.values()), max(options.modes))
     mapped = {re: mapped_run(largest.reference, run, scene.fluid) for re, run in runs.items()}
     rates = EulerianRates.of_scene(scene, largest.reference.points)
-    results |= {
+    kept.results |= {
         "particles": run.particles,
         "points": len(rates.points),
         "fom_seconds": run.metadata["run_seconds"] * scene.steps / run.metadata["steps"],
@@ -152,7 +118,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
         visited = [_visited(1.0 / re, runs[re].time, projected[re]) for re in TRAINED_ON]
         modes_of_rates = rate_basis(rates, flow.basis, visited)
         seconds = clock.perf_counter() - start
-        results["offline"].append({
+        offline.append({
             "modes": modes, "rate_modes": modes_of_rates.size, "rate_basis_s": seconds
         })  # fmt: skip
         viscosity = jnp.asarray(1.0 / options.reynolds)
@@ -176,9 +142,9 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
             row |= online | floor
             if row["stable"]:
                 row |= discrepancies("", truth, profile(np.concatenate([first[None], found])))
-            results["rows"].append(row)
-            write_json(path, results)
+            kept.add(row)
             tell(f"M = {modes}, {row['selection']}, {row.get('samples', '-')} samples")
+    print(_table(kept.results))
 
 
 def _visited(viscosity: float, time, coordinates) -> VisitedStates:

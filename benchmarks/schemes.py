@@ -12,9 +12,7 @@ the same command goes on where it was cut short.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -33,10 +31,8 @@ from jaxsph import (
     run_scene,
 )
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.cli import report_errors
 from jaxsph.effects import FreeSlip, Gravity
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.kernels import WendlandC2
 from jaxsph.metrics import local_quadratic
 from jaxsph.scenes import SCENES, Scene, couette, lid_driven_cavity, poiseuille, taylor_green
@@ -51,11 +47,9 @@ from .measure import (
     format_rows,
     number,
     progress,
-    read_json,
-    tell,
-    write_json,
 )
 from .references.lid_driven_cavity import solve
+from .table import Table, command
 
 _REPEATS = 30
 
@@ -111,33 +105,26 @@ SETS: dict[str, list[dict[str, Any]]] = {
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("schemes", _command, argv)
+    return command("schemes", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.schemes", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--sets", choices=tuple(SETS), nargs="+", default=list(SETS), help="default: all")
     add("--schemes", choices=tuple(SCHEMES), nargs="+", default=list(SCHEMES), help="default: all")
-    add("--json", type=Path, default=Path("benchmarks/results/schemes.json"), metavar="FILE",
-        help="results, and what is done already (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
-    rows = (read_json(options.json) or {}).get("rows", [])
-    with jax.enable_x64(True):
-        for case in (case for name in options.sets for case in SETS[name]):
-            for scheme in ("both",) if case["kind"] == "rates" else options.schemes:
-                key = {**case, "scheme": scheme}
-                if any(all(row.get(k) == v for k, v in key.items()) for row in rows):
-                    continue
-                tell(", ".join(f"{name} {value}" for name, value in key.items()))
-                found = rates(case) if scheme == "both" else run(case, scheme)
-                rows.append({**key, **found, "environment": environment()})
-                write_json(options.json, {"rows": rows})
-    print(table(rows))
-    return 0
+
+
+def _run(options) -> None:
+    kept = Table(options.json)
+    for key in kept.left(_cases(options)):
+        found = rates(key) if key["scheme"] == "both" else run(key, key["scheme"])
+        kept.add({**key, **found, "environment": environment()})
+    print(table(kept.rows))
+
+
+def _cases(options):
+    for case in (case for name in options.sets for case in SETS[name]):
+        for scheme in ("both",) if case["kind"] == "rates" else options.schemes:
+            yield {**case, "scheme": scheme}
 
 
 def run(case: dict[str, Any], scheme: str) -> dict[str, Any]:

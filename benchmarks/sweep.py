@@ -10,7 +10,6 @@ are those of `benchmarks.tensor_rom` if it has made them.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from pathlib import Path
 from typing import Any
@@ -19,16 +18,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph import Trajectory
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe
 from jaxsph.scenes import Scene
 from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, summary, write_json
+from .table import command
 from .tensor_rom import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 
 JUDGED = (110.0, 175.0, 240.0)
@@ -38,28 +37,16 @@ _SINGLE_RUNS = 20
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("sweep", _command, argv)
+    return command("sweep", __doc__, _arguments, _run, argv, json="sweep_{scale}.json")
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"sweep_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        try:
-            results = _measured(options)
-        except SimulationError as error:
-            return fail("sweep", f"full model: {error}", 1)
-    write_json(path, results)
+def _run(options) -> None:
+    results = _measured(options)
+    write_json(options.json, results)
     print(_table(results))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.sweep", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -72,9 +59,6 @@ def _parser() -> argparse.ArgumentParser:
         help="Reynolds numbers of full runs to compare with (default: 110 175 240)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/sweep_SCALE.json")  # fmt: skip
-    return parser
 
 
 def _measured(options) -> dict[str, Any]:

@@ -10,7 +10,6 @@ in a folder and finished rows in the JSON file: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from itertools import product
 from pathlib import Path
@@ -22,9 +21,8 @@ import numpy as np
 
 from jaxsph import SimulationError, Trajectory
 from jaxsph.arrangements import Lattice, Stirred
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom.hyper import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
@@ -34,12 +32,11 @@ from .measure import (
     format_rows,
     number,
     progress,
-    read_json,
     repeated,
     summary,
     tell,
-    write_json,
 )
+from .table import Table, command
 
 TRAINED_ON = (100.0, 150.0, 200.0, 250.0)
 HELD_BACK = 200.0
@@ -51,28 +48,10 @@ _REPEATS = 5
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("tensor_rom", _command, argv)
+    return command("tensor_rom", __doc__, _arguments, _run, argv, json="tensor_rom_{scale}.json")
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"tensor_rom_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("tensor_rom", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.tensor_rom", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
@@ -84,32 +63,18 @@ def _parser() -> argparse.ArgumentParser:
         help="of the closure's training (default: %(default)s)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/tensor_rom_SCALE.json")  # fmt: skip
-    return parser
 
 
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
+def _run(options) -> None:
     settings = {
         name: getattr(options, name) for name in ("scale", "resolution", "end_time", "iterations")
     }
-    found = read_json(path) or {"settings": settings, "rows": [], "offline": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
-
-
-def _run(path: Path, results: dict[str, Any], options) -> None:
-    done = {tuple(row[name] for name in KEY) for row in results["rows"]}
+    kept = Table(options.json, KEY, settings=settings)
+    kept.results.setdefault("offline", [])
     wanted = product(options.predict, options.modes, CLOSURES)
-    if all(case in done for case in wanted):
+    if all(map(kept.has, wanted)):
         tell("all done before")
-        return
+        return print(_table(kept.results))
     folder = options.out or Path("out", f"tensor-rom-{options.scale}")
     scenes = {re: make_scene(options, re) for re in sorted({*TRAINED_ON, *options.predict})}
     runs = {re: full_run(folder / "full", scene, progress) for re, scene in scenes.items()}
@@ -118,7 +83,7 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
     largest = train(scene, [runs[re] for re in TRAINED_ON], max(options.modes))
     trained = clock.perf_counter() - start
     mapped = {re: mapped_run(largest.reference, run, scene.fluid) for re, run in runs.items()}
-    results |= {
+    kept.results |= {
         "particles": runs[TRAINED_ON[0]].particles,
         "parameters": scene.parameters,
         "trained_on": TRAINED_ON,
@@ -131,18 +96,17 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
         flow = largest.truncated(modes)
         projected = {re: np.asarray(flow.project(fields)) for re, fields in mapped.items()}
         for closure in CLOSURES:
-            left = [re for re in options.predict if (re, modes, closure) not in done]
+            left = [re for re in options.predict if not kept.has((re, modes, closure))]
             if not left:
                 continue
             closed, offline = flow, {"modes": modes, "closure": closure, "training_s": trained}
             if closure == "linear":
                 closed, offline["closure_s"] = _closed(flow, scene, projected, options.iterations)
-            results["offline"].append(offline)
+            kept.results["offline"].append(offline)
             for re in left:
                 row = {"reynolds": re, "modes": modes, "closure": closure}
-                row |= judged(closed, scenes[re], runs[re], projected[re], truth[re])
-                results["rows"].append(row)
-                write_json(path, results)
+                kept.add(row | judged(closed, scenes[re], runs[re], projected[re], truth[re]))
+    print(_table(kept.results))
 
 
 def train(scene: Scene, runs: list[Trajectory], modes: int) -> ReducedFlow:

@@ -9,7 +9,6 @@ trained range and at Re = 10000. Full runs are those of `benchmarks.tensor_rom` 
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph_rom.hyper import mapped_run
 from jaxsph_rom.study import full_run
 
 from .measure import progress, tell, write_json
+from .table import command
 from .tensor_rom import TRAINED_ON, make_scene, train
 
 REYNOLDS = (100.0, 250.0, 10_000.0)
@@ -34,32 +33,22 @@ TIMES_TRAINED = 10
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("tensor_stability", _command, argv)
+    return command(
+        "tensor_stability", __doc__, _arguments, _run, argv, json="tensor_stability_{scale}.json"
+    )
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    path = options.json or Path("benchmarks", "results", f"tensor_stability_{options.scale}.json")
-    check_target(path)
-    with jax.enable_x64(True):
-        try:
-            results = _measured(options)
-        except SimulationError as error:
-            return fail("tensor_stability", f"full model: {error}", 1)
-    write_json(path, results)
+def _run(options) -> None:
+    results = _measured(options)
+    write_json(options.json, results)
     worst = max(results["rows"], key=lambda row: row["highest_energy_over_start"] or np.inf)
     stable = sum(row["stable"] for row in results["rows"])
     print(f"{stable} of {len(results['rows'])} runs stable, M = 1 to {options.modes}")
     print(f"highest energy over that at the start: {worst['highest_energy_over_start']:.6f} "
           f"at M = {worst['modes']}, Re = {worst['reynolds']:g}")  # fmt: skip
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.tensor_stability", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--end-time", type=positive_float, default=1.0, metavar="T",
@@ -67,9 +56,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--modes", type=positive_int, default=50, metavar="M", help="up to (default: 50)")
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/tensor-rom-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/tensor_stability_SCALE.json")  # fmt: skip
-    return parser
 
 
 def _measured(options) -> dict[str, Any]:

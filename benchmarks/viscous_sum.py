@@ -9,9 +9,7 @@ the exact one; 1 is exact. Time is that of one right-hand side.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -20,13 +18,13 @@ import jax.numpy as jnp
 
 from jaxsph import ParticleState, SPHFunctional
 from jaxsph.arrangements import JitteredLattice, Lattice, Packed
-from jaxsph.cli import positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.effects import LaminarViscosity
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import taylor_green
 
 from .measure import format_rows, number, write_json
+from .table import command
 
 VISCOSITY = 0.01  # m^2/s
 STARTS = {
@@ -38,33 +36,26 @@ STARTS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("viscous_sum", _command, argv)
+    return command("viscous_sum", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.viscous_sum", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[50, 100], metavar="N",
         help="particles per side (default: 50 100)")  # fmt: skip
     add("--h-over-dx", type=positive_float, nargs="+", default=[1.5, 2.0, 3.0, 4.0], metavar="X",
         help="smoothing lengths over spacing (default: 1.5 2 3 4)")  # fmt: skip
-    add("--json", type=Path, default=Path("benchmarks/results/viscous_sum.json"), metavar="FILE",
-        help="results (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        rows = [
-            measure(resolution, h_over_dx, name)
-            for resolution in options.resolutions
-            for h_over_dx in options.h_over_dx
-            for name in STARTS
-        ]
+
+
+def _run(options) -> None:
+    rows = [
+        measure(resolution, h_over_dx, name)
+        for resolution in options.resolutions
+        for h_over_dx in options.h_over_dx
+        for name in STARTS
+    ]
     results = {"rows": rows, "device": jax.devices()[0].device_kind, "environment": environment()}
     write_json(options.json, results)
     print(_table(rows))
-    return 0
 
 
 def measure(resolution: int, h_over_dx: float, start: str) -> dict[str, Any]:

@@ -8,50 +8,41 @@ lists of the same capacity. Times are medians over repeats in which both take tu
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
 from jaxsph.arrangements import JitteredLattice
-from jaxsph.cli import positive_int, report_errors
+from jaxsph.cli import positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import lid_driven_cavity, taylor_green
 
 from .measure import alternate, compiled, format_rows, number, summary, tell, write_json
+from .table import command
 
 _MARGIN = 1.3  # of both scenes' neighbour lists
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("wall_cost", _command, argv)
+    return command("wall_cost", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.wall_cost", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--sides", type=positive_int, nargs="+", default=[50, 100], metavar="N",
         help="particles per side (default: 50 100)")  # fmt: skip
     add("--repeats", type=positive_int, default=31, metavar="K", help="default: %(default)s")
-    add("--json", type=Path, default=Path("benchmarks/results/wall_cost.json"), metavar="FILE",
-        help="results (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        rows = [measure(side, options.repeats) for side in options.sides]
+
+
+def _run(options) -> None:
+    rows = [measure(side, options.repeats) for side in options.sides]
     write_json(
         options.json,
         {"rows": rows, "device": jax.devices()[0].device_kind, "environment": environment()},
     )
     print(_table(rows))
-    return 0
 
 
 def measure(side: int, repeats: int) -> dict[str, Any]:

@@ -13,7 +13,6 @@ kept in a folder and finished rows in the JSON file: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from functools import cache, partial
 from pathlib import Path
@@ -24,10 +23,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, Trajectory
-from jaxsph.cli import SCALES, fail, positive_float, positive_int, report_errors
+from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
-from jaxsph.io import check_target
 from jaxsph.metrics import phase_error, probe, relative_discrepancy
 from jaxsph.scenes import SCENES, Scene
 from jaxsph_rom import low_pass
@@ -44,7 +42,8 @@ from jaxsph_rom.hyper.linear_closure import held_back
 from jaxsph_rom.hyper.log_density import from_log_density
 from jaxsph_rom.study import PLANS, full_run
 
-from .measure import format_rows, number, progress, read_json, repeated, summary, tell, write_json
+from .measure import format_rows, number, progress, repeated, summary, tell
+from .table import Table, command
 
 FORMULATIONS = {"compressible": Compressible(), "solenoidal": Solenoidal()}
 CLOSURES = ("none", "linear")
@@ -54,30 +53,13 @@ _REPEATS = 5
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("walled_rom", _command, argv)
-
-
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    name = f"walled_rom_{options.scene.replace('-', '_')}_{options.scale}.json"
-    path = options.json or Path("benchmarks", "results", name)
-    check_target(path)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            _run(path, results, options)
-        except SimulationError as error:
-            return fail("walled_rom", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.walled_rom", description=__doc__.splitlines()[0]
+    return command(
+        "walled_rom", __doc__, _arguments, _run, argv, json="walled_rom_{scene}_{scale}.json"
     )
+
+
+def _arguments(add) -> None:
     scenes = ("lid-driven-cavity", "open-cavity")
-    add = parser.add_argument
     add("scene", choices=scenes, metavar="SCENE", help=f"one of {', '.join(scenes)}")
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
@@ -98,26 +80,12 @@ def _parser() -> argparse.ArgumentParser:
         help="time from which on discrepancies count [s] (default: %(default)g)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/walled-rom-SCENE-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/walled_rom_SCENE_SCALE.json")  # fmt: skip
-    return parser
 
 
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
+def _run(options) -> None:
     names = ("scene", "scale", "resolution", "end_time", "settling", "train", "iterations")
     settings = {name: getattr(options, name) for name in (*names, "judged_from")}
-    found = read_json(path) or {"settings": settings, "rows": []}
-    if found.get("settings") != settings:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
-
-
-def _run(path: Path, results: dict[str, Any], options) -> None:
+    kept = Table(options.json, KEY, settings=settings)
     plan = PLANS[options.scene]
     train = tuple(options.train or plan.train)
     predict, sizes = options.predict or plan.predict, options.modes or plan.modes
@@ -128,20 +96,19 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
     first = scenes[train[0]]
     line = plan.probes(first)
     truths = {re: _Truth(scenes[re], runs[re], line) for re in predict}
-    results |= {
+    kept.results |= {
         "particles": runs[train[0]].particles,
         "parameters": first.parameters,
         "trained_on": train,
         "device": jax.devices()[0].device_kind,
         "environment": environment(),
     }
-    done = {tuple(row[name] for name in KEY) for row in results["rows"]}
     for formulation in options.formulations:
         for closure in options.closures:
             left = [
                 modes
                 for modes in sizes
-                if not all((formulation, closure, modes, re) in done for re in predict)
+                if not all(kept.has((formulation, closure, modes, re)) for re in predict)
             ]
             if not left:
                 continue
@@ -161,12 +128,12 @@ def _run(path: Path, results: dict[str, Any], options) -> None:
                 case = {"formulation": formulation, "closure": closure,
                         "modes": trained.flow.basis.size}  # fmt: skip
                 for re in predict:
-                    if (*case.values(), re) in done:
+                    if kept.has(case | {"reynolds": re}):
                         continue
                     row = case | {"reynolds": re, "predicted": re not in train}
                     row |= _judged(trained, scenes[re], runs[re], truths[re], options.judged_from)
-                    results["rows"].append(row | _offline(trained))
-                    write_json(path, results)
+                    kept.add(row | _offline(trained))
+    print(_table(kept.results))
 
 
 def _maker(options, folder: Path) -> Family:

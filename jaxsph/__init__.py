@@ -1,7 +1,5 @@
 """Differentiable smoothed-particle hydrodynamics in JAX."""
 
-__version__ = "0.1.0"
-
 from . import arrangements as arrangements
 from . import effects as effects
 from . import integrate as integrate
@@ -32,6 +30,7 @@ from .sweeps import read_status as read_status
 from .sweeps import sweep as sweep
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
+from .version import __version__ as __version__
 from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
 from .walls import MovingBody as MovingBody

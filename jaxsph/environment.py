@@ -10,7 +10,7 @@ from typing import Any
 
 import jax
 
-from . import __version__
+from .version import __version__
 
 _PACKAGES = ("jax", "jaxlib", "numpy", "equinox", "h5py")
 

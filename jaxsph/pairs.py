@@ -23,6 +23,7 @@ from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
@@ -115,6 +116,16 @@ class Space:
     def cell_volume(self) -> float:
         """Volume of such a cell [m^n]."""
         return math.prod(self.steps)
+
+    def lattice(self, layers: int = 0) -> np.ndarray:
+        """Centres (P, n) [m] of the cells in the box and in layers beyond its closed faces."""
+        box = self.box
+        cells = zip(box.lower, self.steps, self.counts, box.periodic, strict=True)
+        axes = []
+        for lower, step, count, periodic in cells:
+            more = 0 if periodic else layers
+            axes.append(lower + (np.arange(-more, count + more) + 0.5) * step)
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, box.dim)
 
     def check(self) -> None:
         """Raise a ValueError if a periodic box is too small for the kernel's support."""

@@ -53,7 +53,7 @@ def simulate(
     metadata: dict | None = None,
     stepping: Stepping = FixedSteps(),  # noqa: B008
 ) -> Trajectory:
-    """Integrate a model by RK4 and return its snapshots, the first being the state given.
+    """Integrate a model and return its snapshots, the first being the state given.
 
     Run time excludes compilation: the first interval runs twice, once to compile. A neighbour
     list that overflows is allocated anew with a fifth more room, up to eight times, and the run
@@ -69,7 +69,8 @@ def simulate(
         recorder: is given each snapshot as it is made.
         progress: is called with the number of steps done since its last call.
         metadata: kept with the trajectory, beside `steps`, `run_seconds`, `compile_seconds`.
-        stepping: equal steps of dt; or `AutomaticSteps`, with intervals of the same length.
+        stepping: equal steps of dt; or `AutomaticSteps`, with intervals of the same length. By
+            RK4, or another `Stepper` given to either.
 
     Raises:
         ValueError: if the steps are not whole snapshot intervals.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..pairs import Space
@@ -22,9 +23,7 @@ class Arrangement(abc.ABC):
     def places(self, space: Space) -> Float[Array, "particles dim"]:
         """The places [m] that tell which particles belong to a part of the box: those of the
         lattice, unless a rule has its own."""
-        from .lattice import Lattice  # a rule itself
-
-        return Lattice().positions(space)
+        return jnp.asarray(space.lattice())
 
     def record(self) -> dict:
         """The rule and its settings, JSON-like."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import final
 
 import jax.numpy as jnp
-import numpy as np
 
 from .base import Arrangement
 
@@ -21,7 +20,4 @@ class Lattice(Arrangement):
     """
 
     def positions(self, space):
-        cells = zip(space.box.lower, space.steps, space.counts, strict=True)
-        axes = [lower + (np.arange(count) + 0.5) * step for lower, step, count in cells]
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return jnp.asarray(grid.reshape(-1, space.box.dim))
+        return jnp.asarray(space.lattice())

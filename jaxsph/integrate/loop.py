@@ -8,7 +8,6 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
-from ..trajectory import Snapshot
 from .checkpoints import segment_length
 from .faults import Fault, FaultCode
 from .model import Model
@@ -24,8 +23,8 @@ def integrate(
     snapshots: int,
     stepping: Stepping = FixedSteps(),  # noqa: B008
     checkpoints: int | None = None,
-) -> tuple[Any, Fault, Snapshot, Array]:
-    """RK4 over `snapshots` intervals of `steps_per_snapshot` dt each, in nested `lax.scan`s.
+) -> tuple[Any, Fault, Any, Array]:
+    """Steps over `snapshots` intervals of `steps_per_snapshot` dt each, in nested `lax.scan`s.
 
     Pure: jit, vmap and differentiate it. The auxiliary structure is built anew at the start of
     every interval, so that a run which starts from a snapshot repeats this one bit by bit. After
@@ -41,13 +40,14 @@ def integrate(
         time_step: dt [s].
         steps_per_snapshot: of dt in an interval.
         snapshots: intervals.
-        stepping: equal steps of dt, or steps chosen within each interval.
+        stepping: equal steps of dt, or steps chosen within each interval; and by which `Stepper`,
+            RK4 unless another is given.
         checkpoints: states that reverse mode keeps, at least one for each interval; twice the
             square root of the number of steps if none is given. More cost memory and save no time.
 
     Returns:
-        the last good state, the fault (code 0 if none), the snapshot after each interval with
-        a leading axis of length `snapshots`, and which of these are good.
+        the last good state, the fault (code 0 if none), what the model observes after each interval
+        with a leading axis of length `snapshots`, and which of these are good.
     """
 
     segment = segment_length(steps_per_snapshot, snapshots, checkpoints)

@@ -6,15 +6,19 @@ import abc
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..trajectory import Snapshot
-from .faults import Fault
+from .faults import Fault, FaultCode
 
 
 class Model(eqx.Module):
-    """A dynamical system dy/dt = f(t, y) with an auxiliary structure (a neighbour list, say) that
-    is rebuilt now and then and is not differentiated."""
+    """A dynamical system dy/dt = f(t, y); `rates` is all that it must have.
+
+    It may keep an auxiliary structure (a neighbour list, say) that is rebuilt now and then and is
+    not differentiated; there is none unless a model has its own `prepare` and `refresh`.
+    """
 
     def at(self, time: Float[Array, ""]) -> Model:
         """The model at a time [s], its walls where they are then; itself if it has none that move.
@@ -25,24 +29,25 @@ class Model(eqx.Module):
         return self
 
     @abc.abstractmethod
-    def prepare(self, state: Any) -> Any:
-        """The auxiliary structure for a state, built anew."""
-
-    @abc.abstractmethod
-    def refresh(self, auxiliary: Any, state: Any, time_step: Float[Array, ""]) -> Any:
-        """The auxiliary structure, rebuilt if it would not last another step."""
-
-    @abc.abstractmethod
     def rates(self, time: Float[Array, ""], state: Any, auxiliary: Any) -> Any:
         """dy/dt, a pytree like the state."""
 
-    @abc.abstractmethod
+    def prepare(self, state: Any) -> Any:
+        """The auxiliary structure for a state, built anew."""
+        return None
+
+    def refresh(self, auxiliary: Any, state: Any, time_step: Float[Array, ""]) -> Any:
+        """The auxiliary structure, rebuilt if it would not last another step."""
+        return auxiliary
+
     def finish(self, state: Any) -> Any:
         """A state as a step leaves it (positions wrapped into the box)."""
+        return state
 
-    @abc.abstractmethod
     def inspect(self, step: Array, state: Any, auxiliary: Any) -> Fault:
-        """What is wrong with a step's result, if anything."""
+        """What is wrong with a step's result, if anything; here a value that is not finite."""
+        lost = [~jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(state)]
+        return Fault.first_of(step, *((FaultCode.NOT_FINITE, each, -1) for each in lost))
 
     def likely_cause(self, fault: Fault, state: Any, time_step: float) -> str | None:
         """What a fault most likely comes from and what to do, told by the last good state on the
@@ -65,6 +70,6 @@ class Model(eqx.Module):
         """The largest change of a velocity [m/s] between two states, for `step_limit`."""
         raise NotImplementedError(f"{type(self).__name__} has no step limit; use FixedSteps.")
 
-    @abc.abstractmethod
-    def observe(self, state: Any) -> Snapshot:
-        """The particle fields to record."""
+    def observe(self, state: Any) -> Any:
+        """What to record: a `Snapshot`, if `simulate` is to run the model; here the state."""
+        return state

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import final
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
+
+from .stepper import Stepper
 
 _NODES = np.array([0.0, 0.5, 0.5, 1.0])
 _WEIGHTS = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
@@ -29,3 +33,11 @@ def rk4_step(rates, time, state, time_step):
     coefficients = (jnp.asarray(_NODES, time.dtype), jnp.asarray(_WEIGHTS, time.dtype))
     (_, new), _ = lax.scan(stage, (jax.tree.map(jnp.zeros_like, state), state), coefficients)
     return new
+
+
+@final
+class RK4(Stepper):
+    """The classical Runge-Kutta method of fourth order; the limits of steps are made for it."""
+
+    def step(self, rates, time, state, time_step):
+        return rk4_step(rates, time, state, time_step)

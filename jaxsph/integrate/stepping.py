@@ -14,13 +14,14 @@ from jaxtyping import Array, Float
 from .checkpoints import checkpointed_scan
 from .faults import Fault, FaultCode
 from .model import Model
-from .runge_kutta import rk4_step
+from .runge_kutta import RK4
+from .stepper import Stepper
 
 _ENDED = 1e-6  # of an interval: less than this is round-off
 
 
 class Stepping(eqx.Module):
-    """A rule for the RK4 steps of an interval."""
+    """A rule for the steps of an interval."""
 
     @abc.abstractmethod
     def advance(
@@ -46,10 +47,10 @@ class Stepping(eqx.Module):
         """
 
 
-def _step(model: Model, state, auxiliary, number, time, time_step):
-    """One RK4 step, checked: the last good state, the auxiliary structure and the fault."""
+def _step(stepper: Stepper, model: Model, state, auxiliary, number, time, time_step):
+    """One step, checked: the last good state, the auxiliary structure and the fault."""
     auxiliary = model.at(time).refresh(auxiliary, state, time_step)
-    new = rk4_step(lambda t, y: model.rates(t, y, auxiliary), time, state, time_step)
+    new = stepper.step(lambda t, y: model.rates(t, y, auxiliary), time, state, time_step)
     new = model.finish(new)
     fault = model.at(time + time_step).inspect(number, new, auxiliary)
     good = fault.code == int(FaultCode.NONE)
@@ -59,14 +60,20 @@ def _step(model: Model, state, auxiliary, number, time, time_step):
 
 @final
 class FixedSteps(Stepping):
-    """Equal steps of dt, the paper's."""
+    """Equal steps of dt, the paper's.
+
+    Args:
+        stepper: the method of a step.
+    """
+
+    stepper: Stepper = RK4()
 
     def advance(self, model, state, fault, start, time_step, steps, segment):
         def step(carry, number):
             def move(carry):
                 state, auxiliary, _ = carry
                 time = (number - 1).astype(time_step.dtype) * time_step
-                return _step(model, state, auxiliary, number, time, time_step)
+                return _step(self.stepper, model, state, auxiliary, number, time, time_step)
 
             good = carry[2].code == int(FaultCode.NONE)
             return lax.cond(good, move, lambda carry: carry, carry)
@@ -88,9 +95,11 @@ class AutomaticSteps(Stepping):
 
     Args:
         most: steps of an interval, times those of dt (static).
+        stepper: the method of a step; the model's limits are those of RK4.
     """
 
     most: int = eqx.field(static=True, default=4)
+    stepper: Stepper = RK4()
 
     def __check_init__(self):
         if self.most < 1:
@@ -111,7 +120,7 @@ class AutomaticSteps(Stepping):
             step = left / jnp.ceil(left / model.at(time).step_limit(state, change))
             step = jnp.where(jnp.isfinite(step), step, time_step)  # the step's checks name the rest
             number = start + jnp.ceil((elapsed + step) / time_step - _ENDED).astype(jnp.int32)
-            new, auxiliary, fault = _step(model, state, auxiliary, number, time, step)
+            new, auxiliary, fault = _step(self.stepper, model, state, auxiliary, number, time, step)
             return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
 
         def step(carry, _):

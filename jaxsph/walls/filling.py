@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..arrangements import Lattice
 from ..pairs import Space
 from .region import Region
 from .walls import Walls, distances
@@ -25,7 +24,7 @@ def volume(region: Region, space: Space) -> float:
     Cells of the lattice are counted whole where no surface is near, and in parts by the signed
     distance elsewhere: exact where surfaces lie between cells, second-order otherwise.
     """
-    cells, steps = np.asarray(Lattice().positions(space)), np.asarray(space.steps)
+    cells, steps = space.lattice(), np.asarray(space.steps)
     depth = -distances(region, cells)
     whole = np.abs(depth) >= 0.5 * math.hypot(*space.steps)
     count, parts = float((depth[whole] > 0.0).sum()), _PARTS[space.box.dim]

@@ -15,7 +15,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..arrangements import Lattice
 from ..pairs import Space
 from .moving_body import Bodies, MovingBody
 from .region import Region
@@ -97,7 +96,7 @@ class Walls(eqx.Module):
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
         distance = partial(_in_blocks, _distance, fluid_region)
         _refuse_gaps(distance, space)
-        lattice = _extended_lattice(space, layers)
+        lattice = space.lattice(layers)
         depth = distance(lattice)
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
@@ -203,8 +202,8 @@ def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
 
 def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Space, thickness):
     """Places at t = 0, normals and owners of the ghosts of bodies in a region of fluid."""
-    lattice = Lattice().positions(space)
-    lattice = np.asarray(lattice)[_in_blocks(_distance, fluid_region, np.asarray(lattice)) < 0.0]
+    lattice = space.lattice()
+    lattice = lattice[_in_blocks(_distance, fluid_region, lattice) < 0.0]
     fixed = partial(_in_blocks, _distance, fluid_region)
     wet = partial(_in_blocks, _distance, _without(fluid_region, bodies))
     found, taken = [], np.zeros(len(lattice), bool)
@@ -290,17 +289,6 @@ def _gradient(region: Region, points):
 
 def _at(point) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
-
-
-def _extended_lattice(space: Space, layers: int) -> np.ndarray:
-    """The lattice of the box, continued by some layers beyond its closed faces."""
-    box = space.box
-    axes = []
-    cells = zip(box.lower, space.steps, space.counts, box.periodic, strict=True)
-    for lower, step, count, periodic in cells:
-        more = 0 if periodic else layers
-        axes.append(lower + (np.arange(-more, count + more) + 0.5) * step)
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, box.dim)
 
 
 def _refuse_gaps(distance, space: Space) -> None:

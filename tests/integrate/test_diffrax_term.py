@@ -9,7 +9,7 @@ import pytest
 from jaxtyping import Array
 
 from jaxsph.arrangements import Lattice
-from jaxsph.integrate import Fault, FaultCode, Model, rk4_step
+from jaxsph.integrate import FaultCode, Model, rk4_step
 from jaxsph.integrate.diffrax_term import ode_term
 from jaxsph.scenes import taylor_green
 
@@ -26,23 +26,8 @@ class Forced(Model):
 
     rate: Array
 
-    def prepare(self, state):
-        return ()
-
-    def refresh(self, auxiliary, state, time_step):
-        return auxiliary
-
     def rates(self, time, state, auxiliary):
         return -self.rate * (state - jnp.cos(time))
-
-    def finish(self, state):
-        return state
-
-    def inspect(self, step, state, auxiliary):
-        return Fault.none()
-
-    def observe(self, state):
-        return state
 
 
 def end(rate, start=0.5, adjoint=None):

@@ -24,19 +24,10 @@ class Oscillators(Model):
     frequency: Array
     failure: Array  # one time for each particle
 
-    def prepare(self, state):
-        return ()
-
-    def refresh(self, auxiliary, state, time_step):
-        return auxiliary
-
     def rates(self, time, state, auxiliary):
         x, v = state
         force = jnp.where(time > self.failure, jnp.nan, jnp.cos(time))
         return v, force[:, None] - self.frequency**2 * x
-
-    def finish(self, state):
-        return state
 
     def inspect(self, step, state, auxiliary):
         wild = ~jnp.isfinite(state[1]).all(1)
