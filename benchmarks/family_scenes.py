@@ -38,7 +38,7 @@ def vessel(viscosity: float, force: float, *, resolution: int, end_time: float) 
         "stirred-vessel",
         box=Box((0.0, 0.0), (1.0, 1.0), (False, False)),
         fluid_region=BoxRegion((0.0, 0.0), (1.0, 1.0)),
-        force=lambda dtype: Stirring(jnp.asarray(force, dtype)),
+        force=Stirring(force),
         scale=Scale(resolution, 2.0, 0.1 / resolution, 10),
         end_time=end_time,
         reference_density=1.0,
