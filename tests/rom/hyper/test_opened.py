@@ -6,10 +6,11 @@ from functools import cache
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import Array, Float
 
 from jaxsph import Fluid
 from jaxsph.arrangements import Lattice
-from jaxsph.effects import DensityDiffusion, Gravity, LaminarViscosity
+from jaxsph.effects import DensityDiffusion, Effect, Gravity, LaminarViscosity
 from jaxsph.scenes import lid_driven_cavity, taylor_green
 from jaxsph_rom import Energy, pod
 from jaxsph_rom.hyper import Coefficients, EulerianRates, ReferenceOperators
@@ -18,12 +19,21 @@ from jaxsph_rom.hyper.opened import Opened
 from jaxsph_rom.hyper.quadratic_system import projected
 
 
+class Pull(Effect):
+    """A uniform force that ghosts do not know: their density would go with force / c0^2."""
+
+    vector: Float[Array, " dim"]
+
+    def rates(self, context, fields, sums):
+        return {"velocity": jnp.broadcast_to(self.vector, fields["velocity"].shape)}
+
+
 @cache
 def cavity():
     return lid_driven_cavity(12, 100.0)
 
 
-def scene_of(viscosity, sound, lid, pull, delta=0.1):
+def scene_of(viscosity, sound, lid, pull, delta=0.1, kind=Pull):
     """A cavity whose viscosity, speed of sound, lid, force and diffusion are anything."""
     first = cavity()
     changed = {
@@ -33,8 +43,8 @@ def scene_of(viscosity, sound, lid, pull, delta=0.1):
     effects = [changed.get(e.name, e) for e in first.effects]
     walls = dataclasses.replace(first.walls, velocity=lid * first.walls.velocity)
     fluid = Fluid(first.fluid.reference_density, sound, first.fluid.reference_speed)
-    gravity = Gravity(jnp.asarray([pull, -2.0 * pull]))
-    return dataclasses.replace(first, effects=(*effects, gravity), walls=walls, fluid=fluid)
+    force = kind(jnp.asarray([pull, -2.0 * pull]))
+    return dataclasses.replace(first, effects=(*effects, force), walls=walls, fluid=fluid)
 
 
 SCENES = [
@@ -76,6 +86,15 @@ def test_tensors_at_unseen_coefficients_are_the_scenes_own():
     still = dataclasses.replace(system, quadratic=own.quadratic)
     found = still(a, coefficients.values(functional))
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * float(jnp.abs(wanted).max()))
+
+
+def test_ghosts_under_a_force_are_no_polynomial_of_the_sound_speed():
+    scenes = [scene_of(*values, kind=Gravity) for values in SCENES]
+    functionals = [on_points(scene) for scene in scenes]
+    coefficients = Coefficients.between(functionals)
+    operators = ReferenceOperators.of_scene(scenes[0], scenes[0].state.position, coefficients)
+    with pytest.raises(ValueError, match="make: .* fluid.sound_speed"):
+        Opened.found(operators, [np.asarray(coefficients.values(f)) for f in functionals])
 
 
 def test_an_array_that_training_does_not_span_is_named():
