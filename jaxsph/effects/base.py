@@ -102,6 +102,12 @@ class Effect(eqx.Module):
         """The longest stable step [s] as far as this effect goes."""
         return math.inf
 
+    def step_limit_from(
+        self, position: Float[Array, "particles dim"], fluid: Fluid, space: Space
+    ) -> float:
+        """The same as far as it hangs on where particles start."""
+        return math.inf
+
     def geometry_terms(self, space: Space) -> tuple[PairTerm, ...]:
         """Sums wanted of the first pass."""
         return ()

@@ -1,5 +1,7 @@
 """A short-range repulsion by walls, for particles that flow around an edge."""
 
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,7 +12,6 @@ from .base import Effect
 
 _RANGE = 0.15  # times dx; a particle at rest beside a wall is half a spacing away
 _ASIDE = 1e-3  # times dx
-_NEAREST = 0.05  # times dx: where a row at the start is refused; nearer, the force is stiffer
 _RUNGE_KUTTA = 2.8284  # of the frequency of an oscillator: the step that RK4 stands
 _STRENGTH = 0.2  # holds a particle that flies at the wall with up to c0 sqrt(strength range / 1.5)
 
@@ -24,7 +25,7 @@ class WallRepulsion(Effect):
     whose speed towards the wall is below c0 (2 A a / (3 dx))^(1/2), 0.14 c0. Short-range boundary
     forces go back to Monaghan (1994). A particle held at d oscillates at
     w = c0 (2 A (1 - d / a) / (a dx))^(1/2), which a step resolves up to 2.83 / w (RK4): 2.1 dx / c0
-    at d = 0.05 dx.
+    at d = 0.05 dx, which limits the step of a scene that starts with particles so near.
 
     Args:
         fluid_region: where fluid may be (static); the scene's moving bodies repel as well.
@@ -32,9 +33,15 @@ class WallRepulsion(Effect):
 
     fluid_region: Region = eqx.field(static=True)
 
-    def step_limit(self, fluid, space):
-        stiffness = 2.0 * _STRENGTH * (1.0 - _NEAREST / _RANGE) / _RANGE
-        return _RUNGE_KUTTA / stiffness**0.5 * space.spacing / fluid.sound_speed
+    def step_limit_from(self, position, fluid, space):
+        """That of an oscillator of the force's stiffness where the nearest particle starts."""
+        inside = -self.fluid_region.signed_distance(position) / space.spacing
+        nearest = float(jnp.min(inside, where=inside > 0.0, initial=jnp.inf))
+        closeness = max(1.0 - nearest / _RANGE, 0.0)
+        stiffness = 2.0 * _STRENGTH * closeness / _RANGE
+        if stiffness == 0.0:
+            return math.inf
+        return _RUNGE_KUTTA / stiffness**0.5 * space.spacing / float(fluid.sound_speed)
 
     def on_fixed_points(self):
         return ()  # no point comes near a wall

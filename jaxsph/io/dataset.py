@@ -22,9 +22,7 @@ def dataset(trajectory: Trajectory) -> Any:
     try:
         import xarray
     except ImportError:
-        raise ImportError(
-            "xarray is not there; install it, or the extra jaxsph[xarray]."
-        ) from None
+        raise ImportError("xarray is not there; install it, or the extra jaxsph[xarray].") from None
     fields = {name: np.asarray(getattr(trajectory, name)) for name in FIELDS}
     arrays = {
         name: (_DIMENSIONS[: value.ndim], value, {"units": UNITS[name]})

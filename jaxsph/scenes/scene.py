@@ -79,8 +79,8 @@ class Scene(eqx.Module):
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
-                "(the least of 1.5 h/c0, 0.125 h^2/nu, 2.1 dx/c0 at walls and the limits of other "
-                "effects); choose one below it."
+                "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
+                "wall, and the limits of other effects); choose one below it."
             )
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
@@ -128,8 +128,10 @@ class Scene(eqx.Module):
     def stable_time_step(self) -> float:
         """The largest stable step [s]: acoustic CFL of the paper, and those of its effects."""
         acoustic = CFL * self.space.smoothing_length / float(self.fluid.sound_speed)
-        limits = (float(effect.step_limit(self.fluid, self.space)) for effect in self.effects)
-        return min(acoustic, *limits)
+        of_all = self.fluid, self.space
+        limits = [float(effect.step_limit(*of_all)) for effect in self.effects]
+        start = [effect.step_limit_from(self.state.position, *of_all) for effect in self.effects]
+        return min(acoustic, *limits, *start)
 
     @property
     def steps(self) -> int:
