@@ -8,25 +8,24 @@ from ..pairs import PairTerm
 from .base import Effect
 
 _RANGE = 0.4  # times dx; evenly spread particles stay farther apart
-_STRENGTH = 0.2  # stops a pair that approaches with up to 0.33 c0
+_STRENGTH = 2.0 / 3.0  # stops a pair that approaches with up to 0.33 c0
 
 
 @dataclass(frozen=True)
 class Closeness:
-    """(1 - r / a)^2 (x_j - x_i) / r where r < a"""
+    """(1 - r^2 / a^2) (x_j - x_i) where r < a"""
 
     reach: float
 
     def __call__(self, pair, i, j):
-        distance = pair.distance
-        close = jnp.maximum(1.0 - distance / self.reach, 0.0)
-        return pair.separation * (close * close / distance)
+        close = 1.0 - pair.squared_distance * (1.0 / self.reach**2)
+        return pair.separation * jnp.maximum(close, 0.0)
 
 
 class PairRepulsion(Effect):
-    """du_i/dt = -A c0^2 / dx sum_j (1 - r / a)^2 (x_j - x_i) / r over neighbours with r < a:
+    """du_i/dt = -A c0^2 / dx^2 sum_j (1 - r^2 / a^2) (x_j - x_i) over neighbours with r < a:
 
-    a = 0.4 dx, A = 0.2. A kernel's gradient vanishes at r = 0, so pressure lets two particles fall
+    a = 0.4 dx, A = 2/3. A kernel's gradient vanishes at r = 0, so pressure lets two particles fall
     into one place where the kernel is wide, a jet thin or viscosity low; such a pair moves as one
     particle of twice the mass ever after. The force has a potential, so it makes no energy, and it
     conserves momentum; among evenly spread particles it is zero.
@@ -39,5 +38,5 @@ class PairRepulsion(Effect):
         return (PairTerm("closeness", (), Closeness(_RANGE * space.spacing)),)
 
     def rates(self, context, fields, sums):
-        strength = _STRENGTH * context.fluid.sound_speed**2 / context.space.spacing
+        strength = _STRENGTH * (context.fluid.sound_speed / context.space.spacing) ** 2
         return {"velocity": -strength * sums["closeness"]}

@@ -81,11 +81,11 @@ def test_pair_repulsion_has_a_potential_and_spares_even_particles():
     position = scene.state.position.at[3].set(scene.state.position[40] + jnp.asarray([0.2, 0.1]))
     close = dataclasses.replace(scene, state=dataclasses.replace(scene.state, position=position))
     found = rates_of(close)(close.state).velocity
-    reach, strength = 0.4, 0.2 * 100.0
+    reach, strength = 0.4, 2.0 / 3.0 * 100.0
 
     def potential(x):
-        apart = jnp.sqrt(jnp.sum((x - position[40]) ** 2))
-        return strength * reach / 3.0 * (1.0 - apart / reach) ** 3
+        squared = jnp.sum((x - position[40]) ** 2)
+        return strength * reach**2 / 4.0 * (1.0 - squared / reach**2) ** 2
 
     np.testing.assert_allclose(found[3], -jax.grad(potential)(position[3]), rtol=1e-12)
     np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=1e-12)
