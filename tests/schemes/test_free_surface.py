@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.free_surfaces import still_water
-from jaxsph import run_scene
+from jaxsph import Box, Fluid, Space, run_scene
 from jaxsph.effects import (
     AdjointContinuity,
+    Context,
     FreeSlip,
     FreeSurface,
     KernelCorrection,
@@ -21,6 +22,8 @@ from jaxsph.effects import (
     WallPressure,
 )
 from jaxsph.effects.adjoint_continuity import moving_ghost_flux, moving_wall_divergence
+from jaxsph.integrate import rk4_step
+from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import dam_break
 from jaxsph.schemes import Consistent
 from jaxsph.vector import Vector
@@ -81,7 +84,7 @@ def test_pair_repulsion_has_a_potential_and_spares_even_particles():
     position = scene.state.position.at[3].set(scene.state.position[40] + jnp.asarray([0.2, 0.1]))
     close = dataclasses.replace(scene, state=dataclasses.replace(scene.state, position=position))
     found = rates_of(close)(close.state).velocity
-    reach, strength = 0.4, 2.0 / 3.0 * 100.0
+    reach, strength = 0.4, 4.0 / 9.0 * (10.0 / 2.0) ** 2  # c0 = 10 m/s, h = 2 m
 
     def potential(x):
         squared = jnp.sum((x - position[40]) ** 2)
@@ -89,6 +92,31 @@ def test_pair_repulsion_has_a_potential_and_spares_even_particles():
 
     np.testing.assert_allclose(found[3], -jax.grad(potential)(position[3]), rtol=1e-12)
     np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", [1.5, 1.0])
+def test_pairs_that_meet_gain_no_energy_on_the_average(step):
+    """Head on, by RK4 steps of up to the sound's limit in h / c0, at many phases of a step."""
+    space = Space(Box((0.0, 0.0), (1.0, 1.0), (True, True)), WendlandC2(), 2.0, 1.0)
+    term, fluid = PairRepulsion().rate_terms(space)[0], Fluid(1.0, 10.0, 1.0)
+    context = Context(jnp.zeros(()), fluid, jnp.asarray(1.0), space)
+    still = jnp.zeros(1000)
+
+    def slope(_, place):
+        pair = SimpleNamespace(separation=Vector((place[0], still)), squared_distance=place[0] ** 2)
+        total = jnp.stack(term.function(pair, None, None), axis=1)
+        found = PairRepulsion().rates(context, {}, {"closeness": total})["velocity"][:, 0]
+        return jnp.stack([place[1], -2.0 * found])  # of the other particle's approach
+
+    dt = step * 2.0 / 10.0
+    for speed in (0.1, 0.3, 1.0):
+        phase = jnp.linspace(0.0, 1.0, 1000)
+        place = jnp.stack([0.4 + speed * dt * phase, jnp.full(1000, -speed)])
+        for _ in range(int(4.0 + 1.0 / (speed * dt))):
+            place = rk4_step(slope, jnp.zeros(()), place, jnp.asarray(dt))
+        ratio = place[1] ** 2 / speed**2
+        assert place[0].min() > 0.4  # apart again
+        assert ratio.mean() < 1.0 and ratio.max() < 1.5
 
 
 def test_still_water_stays_level():
