@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +13,7 @@ import jaxsph_rom
 from jaxsph import ParticleState
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import Effect, Gravity, LaminarViscosity
+from jaxsph.fluid import TaitEquationOfState
 from jaxsph.kernels import WendlandC2, WendlandC4
 from jaxsph.scenes import taylor_green
 
@@ -189,11 +191,16 @@ class Stirrer(Effect):
         return {"velocity": jnp.zeros_like(fields["velocity"]).at[:, 0].set(push)}
 
 
+def of_tait(scene):
+    return eqx.tree_at(lambda s: s.fluid.equation_of_state, scene, TaitEquationOfState())
+
+
 @pytest.mark.parametrize(
     "change, match",
     [
         (lambda v, f: make(v, f, own=(CubicDrag(),)), "CubicDrag is not linear.*Samples"),
         (lambda v, f: make(v, f, own=(Stirrer(),)), "Stirrer changes with time.*Samples"),
+        (lambda v, f: of_tait(make(v, f)), "TaitEquationOfState is not linear.*Samples"),
         (lambda v, f: make(v, f, end_time=0.1 if f < 1 else 0.2), "differs .* in its end_time"),
         (lambda v, f: make(v, f, own=(Stirrer(),) * (f < 1)), "differs .* in its effects"),
         (lambda v, f: make(v, f, kernel=KERNELS[f < 1]), "differs .* in its space.kernel"),
