@@ -75,13 +75,6 @@ class Scene(eqx.Module):
     def __check_init__(self):
         if self.steps_per_snapshot < 1:
             raise ValueError(f"steps_per_snapshot: at least 1, got {self.steps_per_snapshot}.")
-        limit = self.stable_time_step
-        if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
-            raise ValueError(
-                f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
-                "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
-                "wall, and the limits of other effects); choose one below it."
-            )
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
             if beyond.any():
@@ -95,6 +88,13 @@ class Scene(eqx.Module):
         check_one_fluid(self.state.density, float(self.fluid.reference_density))
         check_resolved(self.state.position, self.space)
         check_filled(self.state, self.space, self._room)
+        limit = self.stable_time_step
+        if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
+            raise ValueError(
+                f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
+                "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
+                "wall, and the limits of other effects); choose one below it."
+            )
         reached = self.steps * self.time_step
         if abs(reached - self.end_time) > 1e-6 * self.end_time:
             interval = self.steps_per_snapshot
