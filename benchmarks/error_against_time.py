@@ -38,7 +38,7 @@ from jaxsph.plotting.style import (
 )  # fmt: skip
 from jaxsph.scenes import Scene
 from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
-from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
+from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell, write_json

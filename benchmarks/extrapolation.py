@@ -23,7 +23,7 @@ from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.metrics import centre_line
 from jaxsph.scenes import Scene
-from jaxsph_rom.hyper import LinearClosure, TrainedModel, mapped_run, train_each
+from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, write_json

@@ -26,8 +26,8 @@ from jaxsph.cli import fail, positive_float, positive_int, report_errors
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
-from jaxsph_rom.hyper import mapped_run
-from jaxsph_rom.hyper.indicator import velocity_error
+from jaxsph_rom.points import mapped_run
+from jaxsph_rom.points.prediction.indicator import velocity_error
 
 from .family_scenes import CASES
 from .measure import format_rows, number, progress, read_json, tell, write_json

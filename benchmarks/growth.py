@@ -38,7 +38,7 @@ from jaxsph.metrics import kinetic_energy
 from jaxsph.plotting import style
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, ReducedModel
-from jaxsph_rom.hyper import PointsModel, QuadraticSystem
+from jaxsph_rom.points import PointsModel, QuadraticSystem
 
 from . import measure
 

@@ -35,7 +35,7 @@ from jaxsph_rom import (
     low_pass,
     pod,
 )
-from jaxsph_rom.hyper import ReducedFlow, galerkin_system, mapped_run
+from jaxsph_rom.points import ReducedFlow, galerkin_system, mapped_run
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, tell

@@ -27,8 +27,8 @@ import numpy as np
 from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
-from jaxsph_rom.hyper import QuadraticSystem, mapped_run, rollout
-from jaxsph_rom.hyper.adaptive import solve
+from jaxsph_rom.points import QuadraticSystem, mapped_run, rollout
+from jaxsph_rom.points.dynamics.adaptive import solve
 from jaxsph_rom.study import full_run
 
 from .measure import (

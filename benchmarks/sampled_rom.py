@@ -25,7 +25,7 @@ from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import Model, integrate
 from jaxsph.metrics import centre_line, probe
-from jaxsph_rom.hyper import (
+from jaxsph_rom.points import (
     QDEIM,
     Chosen,
     EulerianRates,

@@ -25,7 +25,7 @@ from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene, taylor_green
-from jaxsph_rom.hyper import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
+from jaxsph_rom.points import ProjectedRun, ReducedFlow, fit_linear_closure, mapped_run
 from jaxsph_rom.study import full_run, quiet
 
 from .measure import (

@@ -20,7 +20,7 @@ import numpy as np
 from jaxsph import SimulationError
 from jaxsph.cli import SCALES, positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph_rom.hyper import mapped_run
+from jaxsph_rom.points import mapped_run
 from jaxsph_rom.study import full_run
 
 from .measure import progress, tell, write_json

@@ -29,7 +29,7 @@ from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.metrics import phase_error, probe, relative_discrepancy
 from jaxsph.scenes import SCENES, Scene
 from jaxsph_rom import low_pass
-from jaxsph_rom.hyper import (
+from jaxsph_rom.points import (
     Compressible,
     Family,
     LinearClosure,
@@ -38,8 +38,8 @@ from jaxsph_rom.hyper import (
     mapped_run,
     train_each,
 )
-from jaxsph_rom.hyper.linear_closure import held_back
-from jaxsph_rom.hyper.log_density import from_log_density
+from jaxsph_rom.points.dynamics.log_density import from_log_density
+from jaxsph_rom.points.training.linear_closure import held_back
 from jaxsph_rom.study import PLANS, full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -70,6 +72,7 @@ class Box:
             [self.minimum_image(difference[..., k], k) for k in range(self.dim)], axis=-1
         )
 
+    @partial(jax.jit, static_argnums=0, inline=True)
     def wrap(self, position: Float[Array, "*batch dim"]) -> Float[Array, "*batch dim"]:
         """Positions [m] brought back into the box along its periodic directions."""
         columns = []

@@ -45,4 +45,5 @@ def lattice_moments(kernel: Kernel, dim: int, h_over_dx: float) -> dict[str, flo
 
 def _evaluated(function, distances: np.ndarray, h: float, dim: int) -> np.ndarray:
     with jax.ensure_compile_time_eval():
-        return np.asarray(function(jnp.asarray(distances), h, dim), float)
+        compiled = jax.jit(function, static_argnums=2)
+        return np.asarray(compiled(jnp.asarray(distances), h, dim), float)

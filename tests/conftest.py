@@ -1,5 +1,6 @@
 """Every test runs in double precision and without silent dtype or rank promotion."""
 
+import os
 from pathlib import Path
 
 import hypothesis
@@ -16,6 +17,19 @@ hypothesis.settings.load_profile("jaxsph")
 
 _MAPPINGS = Path("/proc/self/maps")  # where there is such a thing
 _MOST = 25_000  # a process may have 65,530 on Linux
+
+
+def pytest_configure(config):
+    """Programs that one process has compiled are kept for all others, and for the next run."""
+    if hasattr(config, "cache") and not hasattr(config, "workerinput"):
+        kept = {
+            "JAX_COMPILATION_CACHE_DIR": str(config.cache.mkdir("programs")),
+            "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+            "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+        }
+        os.environ.update(kept)  # read by workers, and by commands that tests run
+        for name, value in kept.items():
+            jax.config.update(name.lower(), value if "DIR" in name else int(value))
 
 
 @pytest.fixture(autouse=True, scope="module")

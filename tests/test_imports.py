@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 WHEN_CALLED = {
     ("jaxsph.trajectory", "jaxsph.plotting"),
     ("jaxsph.trajectory", "jaxsph.io"),
-    ("jaxsph_rom.hyper.trained_model", "jaxsph_rom.hyper.model_file"),
+    ("jaxsph_rom.points.prediction.trained_model", "jaxsph_rom.points.files"),
 }
 
 

@@ -24,7 +24,7 @@ from jaxsph_rom import (
     ReferenceSpace,
     pod,
 )
-from jaxsph_rom.hyper import LinearClosure, train
+from jaxsph_rom.points import LinearClosure, train
 
 from .problem import descend
 

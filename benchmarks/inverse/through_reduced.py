@@ -11,7 +11,7 @@ import optax
 from jaxsph import run_scene
 from jaxsph.arrangements import Stirred
 from jaxsph.scenes import balanced, taylor_green
-from jaxsph_rom.hyper import Family, LinearClosure, train
+from jaxsph_rom.points import Family, LinearClosure, train
 
 from .problem import descend, noisy
 

@@ -18,7 +18,7 @@ from jaxsph.scenes import Scene
 from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Study
 from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.cli.run import ADVECTIONS, INTERPOLATIONS, MAPS, MEMORIES
-from jaxsph_rom.hyper import (
+from jaxsph_rom.points import (
     QDEIM,
     Coefficients,
     Compressible,
@@ -35,8 +35,8 @@ from jaxsph_rom.hyper import (
     rate_basis,
     train_each,
 )
-from jaxsph_rom.hyper.fixed_points import on_points
-from jaxsph_rom.hyper.linear_closure import held_back
+from jaxsph_rom.points.dynamics.fixed_points import on_points
+from jaxsph_rom.points.training.linear_closure import held_back
 
 from ..measure import Clocked, progress, repeated, summary
 from .full import training_runs

@@ -165,7 +165,7 @@ def _sizes(setting: Setting, case: Case, time_step: float) -> str:
 
 def _reduced_command(name, case: Case, setting: ReducedSetting, time_step: float) -> str:
     if setting.family == SAMPLED:
-        return "benchmarks.work_precision.reduced.sampled (jaxsph_rom.hyper.SampledRates)"
+        return "benchmarks.work_precision.reduced.sampled (jaxsph_rom.points.SampledRates)"
     quietly = setting.start == "quiet"
     parts = [
         f"jaxsph-rom run {name} --train {' '.join(f'{re:g}' for re in case.trained_on)} "

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import final
 
 import jax
-import jax.numpy as jnp
 
 from .base import Arrangement
 from .lattice import Lattice
@@ -26,9 +26,12 @@ class JitteredLattice(Arrangement):
     seed: int = 0
 
     def positions(self, space):
-        lattice = Lattice().positions(space)
+        return self._moved(Lattice().positions(space), space)
+
+    @partial(jax.jit, static_argnums=(0, 2))
+    def _moved(self, lattice, space):
         jitter = jax.random.uniform(
             jax.random.key(self.seed), lattice.shape, lattice.dtype, minval=-1.0, maxval=1.0
         )
         moved = lattice + self.amplitude * space.spacing * jitter
-        return space.box.wrap(moved) if all(space.box.periodic) else jnp.asarray(moved)
+        return space.box.wrap(moved) if all(space.box.periodic) else moved

@@ -5,9 +5,11 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from ..walls.region import Region
+from ..walls.walls import distances
 from .base import Effect
 
 _RANGE = 0.15  # times dx; a particle at rest beside a wall is half a spacing away
@@ -35,8 +37,8 @@ class WallRepulsion(Effect):
 
     def step_limit_from(self, position, fluid, space):
         """That of an oscillator of the force's stiffness where the nearest particle starts."""
-        inside = -self.fluid_region.signed_distance(position) / space.spacing
-        nearest = float(jnp.min(inside, where=inside > 0.0, initial=jnp.inf))
+        inside = -distances(self.fluid_region, np.asarray(position)) / space.spacing
+        nearest = float(np.min(inside, where=inside > 0.0, initial=np.inf))
         closeness = max(1.0 - nearest / _RANGE, 0.0)
         stiffness = 2.0 * _STRENGTH * closeness / _RANGE
         if stiffness == 0.0:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -90,6 +91,7 @@ class CellGrid:
         index = np.indices(self.shape).reshape(len(self.shape), -1).T
         return np.asarray(self.box.lower) + (index + 0.5) * np.asarray(self.widths)
 
+    @partial(jax.jit, static_argnums=0, inline=True)
     def locate(self, position: Float[Array, "points dim"]) -> Int[Array, " points"]:
         """The cell of each point; a point outside a closed box belongs to the nearest cell."""
         position = self.box.wrap(position)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -212,6 +213,7 @@ class WalledSearch(eqx.Module):
         built_at = self.ghosts if self.within_reach is None else None
         return WallList(fluid, WallPairs(index, near, ghosts), overflow, built_at)
 
+    @partial(eqx.filter_jit, inline=True)
     def _may_see(self, position) -> Bool[Array, " points"]:
         """Whether a ghost may be within support + skin of each point."""
         if self.within_reach is not None:

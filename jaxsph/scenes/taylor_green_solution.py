@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from math import pi
 from typing import final
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, ScalarLike
 
 WAVENUMBER = 2.0 * pi
 
 
+@jax.jit
 def velocity(
     position: Float[Array, "*points 2"], time: ScalarLike, viscosity: ScalarLike
 ) -> Float[Array, "*points 2"]:
@@ -30,6 +32,7 @@ def velocity(
     return u * _decay(time, viscosity)
 
 
+@jax.jit
 def pressure(
     position: Float[Array, "*points 2"],
     time: ScalarLike,

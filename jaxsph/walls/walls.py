@@ -155,7 +155,7 @@ class Walls(eqx.Module):
 
     def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
         """Distance [m] to the nearest wall, negative in the fluid; see `Region`."""
-        distance = self.fluid_region.signed_distance(position)
+        distance = _distance(self.fluid_region, position)
         if self.bodies is None:
             return distance
         return jnp.maximum(distance, -self.bodies.signed_distance(position))
@@ -172,12 +172,7 @@ class Walls(eqx.Module):
         Each is moved along the signed distance's gradient, in turn for each wall of a corner.
         """
         for _ in range(position.shape[1] + 1):  # out of the corner, then off each of its walls
-            excess = jnp.maximum(self.fluid_region.signed_distance(position) + margin, 0.0)
-            outward = _gradient(self.fluid_region, position)
-            squared = jnp.sum(outward * outward, axis=1)
-            near = (excess > 0.0) & (squared > 0.0)
-            move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
-            position = position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
+            position = _put_off(self.fluid_region, position, margin)
         return position
 
 
@@ -259,7 +254,7 @@ def fill(
         raise ValueError(
             "fluid: no particle lies in the region; raise the resolution or check the region."
         )
-    return position[inside]
+    return jnp.take(position, np.flatnonzero(inside), axis=0)
 
 
 def distances(region: Region, points: np.ndarray) -> np.ndarray:
@@ -277,14 +272,24 @@ def _in_blocks(function, region: Region, points: np.ndarray) -> np.ndarray:
     return np.concatenate([np.asarray(function(region, jnp.asarray(b))) for b in blocks])[:count]
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, inline=True)
 def _distance(region: Region, points):
     return region.signed_distance(points)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, inline=True)
 def _gradient(region: Region, points):
     return jax.vmap(jax.grad(lambda x: region.signed_distance(x[None, :])[0]))(points)
+
+
+@partial(jax.jit, static_argnums=0, inline=True)
+def _put_off(region: Region, position, margin: float):
+    excess = jnp.maximum(region.signed_distance(position) + margin, 0.0)
+    outward = _gradient(region, position)
+    squared = jnp.sum(outward * outward, axis=1)
+    near = (excess > 0.0) & (squared > 0.0)
+    move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
+    return position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
 
 
 def _at(point) -> str:

@@ -17,7 +17,7 @@ from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from jaxsph.scenes import SCENES, Scene
 
 from ..basis import Energy, Euclidean
-from ..hyper import Compressible, Family, Formulation, Solenoidal
+from ..points import Compressible, Family, Formulation, Solenoidal
 from ..study import PLANS, Plan, quiet
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}

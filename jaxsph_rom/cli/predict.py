@@ -19,8 +19,8 @@ from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
 from jaxsph.io import check_target
 
-from ..hyper import Prediction, TrainedModel, load, save_prediction
-from ..hyper.member_files import write_fields, write_tracers
+from ..points import Prediction, TrainedModel, load, save_prediction
+from ..points.files.member_files import write_fields, write_tracers
 from ..report.plain import plain
 from .options import bar, distinct, said
 from .train import print_errors

@@ -15,9 +15,9 @@ from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
 from ..field_advection import ConsistentAdvection, PaperAdvection
-from ..hyper import Family
-from ..hyper.training import check_family
 from ..lattice_polynomials import LatticePolynomials
+from ..points import Family
+from ..points.training.train import check_family
 from ..projection import (
     AdjointPetrovGalerkin,
     ConvectiveMemory,

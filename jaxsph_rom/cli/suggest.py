@@ -11,7 +11,7 @@ import numpy as np
 from jaxsph.cli import print_rows
 from jaxsph.io import check_target
 
-from ..hyper import load
+from ..points import load
 from .options import said
 
 

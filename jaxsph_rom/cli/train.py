@@ -16,7 +16,7 @@ from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
-from ..hyper import (
+from ..points import (
     Family,
     LinearClosure,
     Samples,
@@ -25,8 +25,8 @@ from ..hyper import (
     formulation_for,
     train_each,
 )
-from ..hyper.linear_closure import held_back
-from ..hyper.training import check_family
+from ..points.training.linear_closure import held_back
+from ..points.training.train import check_family
 from ..report.plain import plain
 from ..study import Plan, full_run
 from .options import (

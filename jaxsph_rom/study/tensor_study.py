@@ -9,9 +9,9 @@ import numpy as np
 
 from jaxsph.integrate import Fault, SimulationError
 
-from ..hyper import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
-from ..hyper.linear_closure import held_back
-from ..hyper.training import check_family
+from ..points import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
+from ..points.training.linear_closure import held_back
+from ..points.training.train import check_family
 from .study import Experiment, ModelBasis, Outcome, Study
 
 

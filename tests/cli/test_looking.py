@@ -17,7 +17,7 @@ from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.plotting import FIELDS as DRAWN
 from jaxsph.sweeps import sweep_file
 from jaxsph.trajectory import Snapshot
-from jaxsph_rom.hyper.whole_file import write_whole
+from jaxsph_rom.points.files.whole_file import write_whole
 from tests.runs import random_run
 
 

@@ -9,7 +9,7 @@ import pytest
 from jaxsph.cli import main as look
 from jaxsph.io import read_trajectory
 from jaxsph_rom.cli import main
-from jaxsph_rom.hyper import load, load_prediction
+from jaxsph_rom.points import load, load_prediction
 
 TRAIN = ["train", "taylor-green", "--resolution", "24", "--t-end", "0.05", "--modes", "2"]
 
@@ -141,8 +141,8 @@ def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
     refused("holds no reduced flow")
     path.write_bytes(content)
     with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = 3
-    refused("schema version 3")
+        file.attrs["schema_version"] = 4
+    refused("schema version 4")
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = 1
     refused("an earlier jaxsph_rom; make it anew")

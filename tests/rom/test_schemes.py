@@ -8,7 +8,7 @@ from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
 from jaxsph.schemes import Consistent, DeltaPlus
 from jaxsph_rom import ReducedModel, train
-from jaxsph_rom.hyper.fixed_points import kept_effects
+from jaxsph_rom.points.dynamics.fixed_points import kept_effects
 
 
 def test_on_moving_particles_the_consistent_scheme_is_refused_by_name():

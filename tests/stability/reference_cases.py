@@ -12,7 +12,7 @@ import numpy as np
 from jaxsph import Trajectory
 from jaxsph.arrangements import Lattice
 from jaxsph.integrate import FaultCode
-from jaxsph_rom.hyper import ReducedFlow, mapped_run
+from jaxsph_rom.points import ReducedFlow, mapped_run
 
 from .bounds import DECAY, LOOSE_DENSITY
 from .judge import Case, Ending, Run

@@ -37,8 +37,8 @@ from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene
 from jaxsph.schemes import delta_plus
 from jaxsph.walls.walls import fill
-from jaxsph_rom.hyper.eulerian_rates import EulerianRates
-from jaxsph_rom.hyper.reference_operators import ReferenceOperators
+from jaxsph_rom.points.dynamics.eulerian_rates import EulerianRates
+from jaxsph_rom.points.dynamics.reference_operators import ReferenceOperators
 
 DX = 0.1
 FLUID = Fluid(1000.0, 10.0, 1.0)

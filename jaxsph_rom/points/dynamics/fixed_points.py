@@ -1,0 +1,150 @@
+"""What of a scene acts at points that do not move."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxsph import NeighborSearch, ParticleState, SPHFunctional, WalledSearch
+from jaxsph.effects import Effect
+from jaxsph.scenes import Scene
+
+from ...still_walls import check_still
+
+_ROUND_OFF = 1e5  # times the precision: what changes by less is steady, or linear
+_SEED = 0
+_BEND = 0.1  # of the density: where a bent equation of state shows
+_TIMES, _GOLDEN = 13, 0.6180339887498949
+
+
+def kept_effects(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """What each effect is on fixed points, none of these twice.
+
+    Raises:
+        ValueError: if one has no meaning there.
+    """
+    kept: list[Effect] = []
+    for form in (form for effect in effects for form in effect.on_fixed_points()):
+        if not any(bool(eqx.tree_equal(form, other)) for other in kept):
+            kept.append(form)
+    return tuple(kept)
+
+
+def with_effects(functional: SPHFunctional, effects: tuple[Effect, ...]) -> SPHFunctional:
+    """The functional of other effects."""
+    return eqx.tree_at(
+        lambda f: f.effects, functional, effects, is_leaf=lambda x: isinstance(x, tuple)
+    )
+
+
+def on_points(scene: Scene) -> SPHFunctional:
+    """The functional of a scene on fixed points, all its numbers arrays.
+
+    Raises:
+        ValueError: if bodies are moved through the fluid, or an effect has no meaning there.
+    """
+    check_still(scene)
+    dtype = scene.state.position.dtype
+    functional = with_effects(scene.functional(), kept_effects(scene.effects))
+    return jax.tree.map(
+        lambda a: jnp.asarray(a, dtype) if isinstance(a, float) else a, functional
+    )
+
+
+def check_quadratic(scene: Scene, functional: SPHFunctional, points, neighbors) -> None:
+    """A ValueError if an effect changes with time or is not linear in the velocity, or the
+    fluid's pressure is not linear in its density.
+
+    Each effect's own rates at a random state are compared with those at other times of the scene's
+    run, and with those of twice the velocity.
+
+    Args:
+        scene: its state gives the scales, its steps the times.
+        functional: on the points.
+        points: (G, n) [m].
+        neighbors: list of the points.
+    """
+    dtype, fluid = points.dtype, functional.fluid
+    ratio = jnp.asarray([1.0 - _BEND, 1.0, 1.0 + _BEND], dtype)
+    low, middle, high = fluid.pressure(ratio * fluid.reference_density)
+    if abs(low + high - 2.0 * middle) > 1e-3 * _BEND * abs(high - low):
+        raise ValueError(
+            f"fluid: {type(fluid.equation_of_state).__name__} is not linear in the density, and "
+            "constant tensors hold no more; use reduction=Samples() for this scene."
+        )
+    draw = np.random.default_rng(_SEED).uniform(-1.0, 1.0, points.shape)
+    velocity = fluid.reference_speed * jnp.asarray(draw, dtype)
+    density = jnp.broadcast_to(fluid.reference_density, points.shape[:1])
+    start = jnp.zeros((), dtype)
+    parts = eqx.filter_jit(_rates_by_effect)
+
+    def at(time, factor):
+        state = ParticleState(points, factor * velocity, density)
+        return parts(functional, jnp.asarray(time, dtype), state, neighbors)
+
+    rest, once, twice = (at(start, factor) for factor in (0.0, 1.0, 2.0))
+    for effect, (a, b, c) in zip(
+        functional.effects, zip(rest, once, twice, strict=True), strict=True
+    ):
+        if _differ(jax.tree.map(lambda x, z: 0.5 * (x + z), a, c), b, (a, b, c)):
+            raise ValueError(
+                f"effects: {effect.name} is not linear in the velocity, and constant tensors hold "
+                "no more; use reduction=Samples() for this scene."
+            )
+    # at no even intervals, which a force may share
+    for time in scene.end_time * np.modf(_GOLDEN * np.arange(1, _TIMES))[0]:
+        for effect, a, b in zip(functional.effects, once, at(time, 1.0), strict=True):
+            if _differ(a, b, (once[0], a, b)):
+                raise ValueError(
+                    f"effects: {effect.name} changes with time, a constant part does not; use "
+                    "reduction=Samples() for this scene, or start it where the force is steady."
+                )
+
+
+def _rates_by_effect(functional: SPHFunctional, time, state, neighbors) -> list[dict[str, Array]]:
+    """Rates of velocity and density by each effect, in the list's order."""
+    context, fields, sums = functional.sums(time, state, neighbors)
+    found = [effect.rates(context, fields, sums) for effect in functional.effects]
+    return [{k: v for k, v in rates.items() if k != "position"} for rates in found]
+
+
+def _differ(mine, theirs, scale) -> bool:
+    """Whether rates differ by more than round-off of what they are made of."""
+    for name, value in mine.items():
+        largest = max(float(jnp.abs(part[name]).max()) for part in scale if name in part)
+        allowed = _ROUND_OFF * jnp.finfo(value.dtype).eps * largest
+        if not bool(jnp.abs(value - theirs[name]).max() <= allowed):
+            return True
+    return False
+
+
+def check_steady(scene: Scene, points: Float[Array, "points dim"]) -> None:
+    """A ValueError if tensors cannot hold a scene; see `check_quadratic`."""
+    points = jnp.asarray(points, scene.state.position.dtype)
+    functional = on_points(scene)
+    check_quadratic(scene, functional, points, neighbors_at(functional, points))
+
+
+def neighbors_at(functional: SPHFunctional, points: Float[Array, "points dim"]):
+    """The neighbours of fixed points, which need neither a skin nor a margin.
+
+    Raises:
+        ValueError: if the box is too small for the kernel's support.
+    """
+    space, walls = functional.space, functional.walls
+    box, support = space.box, space.support
+    if walls is None:
+        search = NeighborSearch.allocate(points, box, support, 0.0, 1.0)
+    else:
+        search = WalledSearch.allocate(
+            points, walls.position, box, support, 0.0, space.spacing, 1.0
+        )
+    return _built(search, points)
+
+
+@eqx.filter_jit
+def _built(search, points):
+    return search.build(points)

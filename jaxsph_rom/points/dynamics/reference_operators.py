@@ -1,0 +1,161 @@
+"""The fluid's equations on fixed points: a constant, a linear and a quadratic part."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array, Float
+
+from jaxsph import PairTerm, ParticleState, SPHFunctional, VerletList, WallList
+from jaxsph.effects import Effect, WallTerm
+from jaxsph.scenes import Scene
+from jaxsph.vector import Vector
+
+from ...field_advection import acts_on_ghosts
+from .coefficients import Coefficients
+from .fixed_points import check_quadratic, neighbors_at, on_points, with_effects
+
+
+def carried_density(pair, i, j):
+    """(rho_j - rho_i) grad_i W_ij V_j"""
+    return pair.gradient * (j.density - i.density)
+
+
+def carried_velocity(pair, i, j):
+    """(u_j - u_i) (x) grad_i W_ij V_j, row by row"""
+    difference = j.velocity - i.velocity
+    return Vector(a * g for a in difference for g in pair.gradient)
+
+
+class CarriedGradients(Effect):
+    """Gradients of the fields that the flow carries, at walls with the ghosts' values."""
+
+    def rate_terms(self, space):
+        return (
+            PairTerm("carried_density", ("density",), carried_density),
+            PairTerm("carried_velocity", ("velocity",), carried_velocity),
+        )
+
+    def wall_rate_terms(self, space):
+        density, velocity = ("density",), ("velocity",)
+        return (
+            WallTerm("carried_density", density, density, carried_density),
+            WallTerm("carried_velocity", velocity, velocity, carried_velocity),
+        )
+
+
+class ReferenceOperators(eqx.Module):
+    """The SPH equations of a scene at fixed points x_G of constant volume V_0 = dx^n.
+
+    In the velocity u and the logarithmic density r = rho0 (1 + ln(rho / rho0)),
+
+        dr/dt = -rho0 div u - u . grad r + D r,
+        du/dt = -(c0^2 / rho0) grad r - u . grad u + nu V u + b,
+
+    they are quadratic without remainder. div, grad and the density diffusion D are the full model's
+    pair sums, walls included; at fixed points they are linear. V is that of `IsotropicViscosity`:
+    on a lattice it is more accurate than the full model's, as that one is among moving particles.
+    Advection uses gradients in difference form, sum_j (f_j - f_i) grad W V_0.
+
+    Args:
+        functional: of the effects' forms on fixed points.
+        points: x_G (G, n) [m].
+        neighbors: list of the points.
+        coefficients: what of the functional is left open: theta (K,).
+    """
+
+    functional: SPHFunctional
+    points: Float[Array, "points dim"]
+    neighbors: VerletList | WallList
+    coefficients: Coefficients
+
+    @classmethod
+    def of_scene(
+        cls,
+        scene: Scene,
+        points: Float[Array, "points dim"],
+        coefficients: Coefficients | None = None,
+    ) -> ReferenceOperators:
+        """Operators of a scene.
+
+        Args:
+            scene: whose effects and walls act.
+            points: x_G (G, n) [m].
+            coefficients: left open; the scene's viscosity if none are given.
+
+        Raises:
+            ValueError: if the box is too small for the kernel's support, or an effect changes with
+                time during the scene's run, is not linear in the velocity, or has no meaning on
+                fixed points.
+        """
+        points = jnp.asarray(points, scene.state.position.dtype)
+        functional = on_points(scene)
+        neighbors = neighbors_at(functional, points)
+        check_quadratic(scene, functional, points, neighbors)
+        if coefficients is None:
+            coefficients = Coefficients.named(functional, "viscosity")
+        return cls(functional, points, neighbors, coefficients)
+
+    @classmethod
+    def of(
+        cls, functional: SPHFunctional, points: Float[Array, "points dim"]
+    ) -> ReferenceOperators:
+        """Operators by a functional of fixed points that is known to be steady; none is open."""
+        points = jnp.asarray(points, functional.mass.dtype)
+        return cls(functional, points, neighbors_at(functional, points), Coefficients(()))
+
+    def at(self, values: Float[Array, " coefficients"]) -> ReferenceOperators:
+        """The operators at theta."""
+        functional = self.coefficients.applied(self.functional, values)
+        return ReferenceOperators(functional, self.points, self.neighbors, self.coefficients)
+
+    def affine(
+        self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]
+    ) -> Float[Array, "points fields"]:
+        """Rates of (r, u) at theta without advection, linear but for a force and moving walls."""
+        functional = self.coefficients.applied(self.functional, values)
+
+        def rates(fields):
+            found = functional(jnp.zeros((), fields.dtype), self._state(fields), self.neighbors)
+            return jnp.concatenate([found.density[:, None], found.velocity], axis=1)
+
+        value, slope = jax.jvp(rates, (self.rest,), (fields - self.rest,))
+        return value + slope
+
+    def gradients(self, fields: Float[Array, "points fields"]) -> Float[Array, "points fields dim"]:
+        """grad (r, u), affine in the fields where walls move."""
+        acting = (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects))
+        functional = with_effects(self.functional, acting)
+
+        def gradients(fields):
+            time = jnp.zeros((), fields.dtype)
+            _, _, sums = functional.sums(time, self._state(fields), self.neighbors)
+            count, dim = self.points.shape
+            velocity = sums["carried_velocity"].reshape(count, dim, dim)
+            found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
+            return self.neighbors.unsort(found)
+
+        value, slope = jax.jvp(gradients, (self.rest,), (fields - self.rest,))
+        return value + slope
+
+    @property
+    def rest(self) -> Float[Array, "points fields"]:
+        """(rho0, 0)."""
+        count, dim = self.points.shape
+        rest = jnp.zeros((count, 1 + dim), self.points.dtype)
+        return rest.at[:, 0].set(self.functional.fluid.reference_density)
+
+    @property
+    def space(self):
+        return self.functional.space
+
+    def _state(self, fields) -> ParticleState:
+        return ParticleState(self.points, fields[:, 1:], fields[:, 0])
+
+
+def mapped(function, stack: Float[Array, "points fields modes"], *arguments):
+    """`function` of each mode of a stack, one after another; modes stay last."""
+    found = lax.map(lambda fields: function(fields, *arguments), jnp.moveaxis(stack, -1, 0))
+    return jnp.moveaxis(found, 0, -1)

@@ -1,0 +1,113 @@
+"""Runs of a reduced model at many parameters."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxsph import Trajectory
+
+if TYPE_CHECKING:
+    from .trained_model import TrainedModel
+
+
+class Maker:
+    """The model that made a prediction: known by its identity, so that it is structure under
+    `jax.jit`.
+
+    Args:
+        model: a trained model.
+    """
+
+    def __init__(self, model: TrainedModel):
+        self.model = model
+
+
+class Prediction(eqx.Module):
+    """A member for each set of parameters.
+
+    Args:
+        names: of the parameters (static).
+        points: a row of them a member (K, n).
+        values: theta of each member's operators.
+        time: of the snapshots (S,) [s].
+        coordinates: (K, S, M); NaN from a member's fault on.
+        status: a `FaultCode` each, 0 for a good run (K,).
+        step: that met the fault, -1 for a good run (K,).
+        outside: whether a member is beyond the training points' range in a parameter, or the
+            prediction goes on beyond their time (K,).
+        start: where members start from: `given`; `family`, as `make` has it at these parameters;
+            or `interpolated` between the training runs (static).
+        operators: `family`, as `make` has them, or `interpolated` (static).
+        maker: of it; none in a prediction of a file without its model (static).
+        run_seconds, compile_seconds: wall-clock time of all members together [s] (static).
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    points: Float[Array, "members names"]
+    values: Float[Array, "members coefficients"]
+    time: Float[Array, " times"]
+    coordinates: Float[Array, "members times modes"]
+    status: Int[Array, " members"]
+    step: Int[Array, " members"]
+    outside: Bool[Array, " members"]
+    start: str = eqx.field(static=True)
+    operators: str = eqx.field(static=True)
+    maker: Maker | None = eqx.field(static=True, default=None)
+    indicated: Float[Array, " members"] | None = None
+    run_seconds: float = eqx.field(static=True, default=float("nan"))
+    compile_seconds: float = eqx.field(static=True, default=float("nan"))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        what = ", ".join(self.names)
+        count, size = self.coordinates.shape[0], self.coordinates.shape[2]
+        return (
+            f"Prediction({count} members over {what}; {size} modes at {len(self.time)} times; "
+            f"start {self.start})"
+        )
+
+    @property
+    def parameters(self) -> dict[str, Float[Array, " members"]]:
+        """Each parameter over the members."""
+        return {name: self.points[:, k] for k, name in enumerate(self.names)}
+
+    @property
+    def error_indicator(self) -> Float[Array, " members"]:
+        """The expected relative error of each member's velocity, as `Indicator` has it; NaN for a
+        member that is lost. It is evaluated when it is first asked for."""
+        return self._indicated
+
+    @cached_property
+    def _indicated(self):
+        if self.indicated is not None:
+            return self.indicated
+        return self._with_model().indicate(self.values, self.time, self.coordinates)
+
+    def fields(self, member: int = 0, points=None) -> Trajectory:
+        """Fields of a member over time, as far as it is good.
+
+        Args:
+            member: its number.
+            points: (P, n) [m]; the reference points if none are given.
+
+        Raises:
+            ValueError: if the prediction is of a file and has no model.
+        """
+        return self._with_model().fields(self, member, points)
+
+    def good(self, member: int) -> int:
+        """The number of a member's snapshots before its fault."""
+        lost = np.isnan(np.asarray(self.coordinates[member])).any(axis=-1)
+        return int(np.argmax(np.append(lost, True)))
+
+    def _with_model(self) -> TrainedModel:
+        if self.maker is None:
+            raise ValueError("model: the prediction has none; load it with model=... as well.")
+        return self.maker.model
