@@ -42,8 +42,8 @@ from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_eac
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, repeated, summary, tell, write_json
+from .reduced_vortex import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 from .table import command
-from .tensor_rom import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 
 REYNOLDS = 175.0
 FULL, FAITHFUL, TENSOR, CLOSED = "full", "on moving particles", "tensor", "tensor, closure"

@@ -27,8 +27,8 @@ from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_eac
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, write_json
+from .reduced_vortex import HELD_BACK, PREDICTED, TRAINED_ON, discrepancies, make_scene, profile_of
 from .table import command
-from .tensor_rom import HELD_BACK, PREDICTED, TRAINED_ON, discrepancies, make_scene, profile_of
 
 _FIELDS = ("time", "position", "velocity", "density", "pressure")
 _PARTS = ("trained", "beyond")

@@ -12,7 +12,6 @@ Finished cases are kept in the JSON file: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 import time as clock
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -30,10 +29,9 @@ import numpy as np
 
 from jaxsph import COMPILER_OPTIONS
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.cli import fail, positive_int, report_errors
+from jaxsph.cli import fail, positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, integrate
-from jaxsph.io import check_target
 from jaxsph.metrics import kinetic_energy
 from jaxsph.plotting import style
 from jaxsph.scenes import Scene, taylor_green
@@ -41,6 +39,7 @@ from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, ReducedModel
 from jaxsph_rom.points import PointsModel, QuadraticSystem
 
 from . import measure
+from .table import Table, command
 
 FULL, NEIGHBORS, MOVING, MOVING_MODES = "full", "neighbors", "moving", "moving-modes"
 TENSORS, GRADIENT = "tensors", "gradient"
@@ -96,42 +95,37 @@ class Case:
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a case did not fit into memory, 2: bad input."""
-    return report_errors("growth", _command, argv)
+    return command("growth", __doc__, _arguments, _run, argv, json="growth_{kind}.json")
 
 
-def _parser() -> argparse.ArgumentParser:
-    title = __doc__.splitlines()[0]
-    parser = argparse.ArgumentParser("python -m benchmarks.growth", description=title)
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--particles", type=positive_int, nargs="+", metavar="N",
         help="the nearest squares are taken (default: seven sizes from 1e3 to 1e6)")  # fmt: skip
     add("--families", choices=tuple(ALONG), nargs="+", default=tuple(ALONG), metavar="FAMILY",
         help=f"some of: {', '.join(ALONG)} (default: all)")  # fmt: skip
-    add("--quick", action="store_true", help="a trial at small sizes, written to out/")
+    add("--quick", action="store_const", const="quick", default="full", dest="kind",
+        help="a trial at small sizes")  # fmt: skip
     add("--repeats", type=positive_int, default=7, metavar="K",
         help="at least; quick calls are made more often (default: %(default)s)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE", help="default: benchmarks/results/growth.json")
-    add("--figure", type=Path, metavar="FILE", help="default: docs/figures/growth.png")
-    return parser
+    add("--figure", type=Path, metavar="FILE",
+        help="default: docs/figures/growth.png, of a trial out/growth.png")  # fmt: skip
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    folders = ("out", "out") if options.quick else ("benchmarks/results", "docs/figures")
-    path = options.json or Path(folders[0], "growth.json")
-    check_target(path)
-    results = measure.read_json(path) or {"rows": [], "growth": [], "environment": environment()}
-    if results["environment"]["machine"] != environment()["machine"]:
-        raise ValueError(f"{path}: is of another machine; name another file with --json.")
-    lost = _run(path, results, cases(options), options.repeats)
-    figure(results, options.figure or Path(folders[1], "growth.png"))
-    print(_table(results))
+def _run(options) -> int:
+    kept = Table(options.json, ("case",), beside=lambda rows: {"growth": growth(rows)})
+    here = environment()
+    if kept.results.setdefault("environment", here)["machine"] != here["machine"]:
+        raise ValueError(f"{options.json}: is of another machine; name another file with --json.")
+    lost = _measure(kept, cases(options), options.repeats)
+    trial = options.kind == "quick"
+    figure(kept.results, options.figure or Path("out" if trial else "docs/figures", "growth.png"))
+    print(_table(kept.results))
     return fail("growth", f"lost, for want of memory: {lost}", 1) if lost else 0
 
 
-def cases(options: argparse.Namespace) -> list[Case]:
+def cases(options) -> list[Case]:
     """All cases asked for, the small ones first."""
-    sizes, modes, steps = QUICK if options.quick else PLAN
+    sizes, modes, steps = QUICK if options.kind == "quick" else PLAN
     squares = sorted({_side(n) ** 2 for n in options.particles or sizes})
     some, few = min(10_000, squares[-1]), min(1024, squares[-1])
     found = [Case(TENSORS, modes=m) for m in sorted({k * m for k in (1, 2, 4) for m in modes})]
@@ -147,22 +141,17 @@ def _side(particles: float) -> int:
     return max(1, round(particles**0.5))
 
 
-def _run(path: Path, results: dict[str, Any], wanted: list[Case], repeats: int) -> list[Case]:
+def _measure(kept: Table, wanted: list[Case], repeats: int) -> list[Case]:
     """Measure the cases not yet there, each in a fresh process; those that were lost."""
-    done = [Case(**row["case"]) for row in results["rows"]]
-    left, lost = [case for case in wanted if case not in done], []
+    left, lost = [case for case in wanted if not kept.has((asdict(case),))], []
     measure.tell(f"{len(wanted) - len(left)} of {len(wanted)} cases done before")
     with measure.progress("cases", len(left)) as report:
         for case in left:
             try:
                 with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as fresh:
-                    row = fresh.submit(measured, case, repeats).result()
+                    kept.add(fresh.submit(measured, case, repeats).result())
             except (BrokenProcessPool, MemoryError, jax.errors.JaxRuntimeError):
                 lost.append(case)
-            else:
-                results["rows"].append(row)
-                results["growth"] = growth(results["rows"])
-                measure.write_json(path, results)
             report(1)
     return lost
 

@@ -39,8 +39,8 @@ from jaxsph_rom.points import ReducedFlow, galerkin_system, mapped_run
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, tell
+from .reduced_vortex import judged, make_scene, profile_of
 from .table import Table, command
-from .tensor_rom import judged, make_scene, profile_of
 
 REYNOLDS = 100.0
 PRODUCTS = {"euclidean": Euclidean(), "energy": Energy(), "block-energy": Energy()}

@@ -40,8 +40,8 @@ from .measure import (
     summary,
     tell,
 )
+from .reduced_vortex import TRAINED_ON, make_scene, train
 from .table import Table, command
-from .tensor_rom import TRAINED_ON, make_scene, train
 
 SOLVERS = {
     "tsit5": diffrax.Tsit5(),

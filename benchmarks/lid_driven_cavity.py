@@ -28,12 +28,10 @@ from jaxsph_rom.study import full_run, with_record
 
 from .measure import format_rows, near_walls, number, progress, tell
 from .references import ghia
-from .references.lid_driven_cavity import constant_lid, regularised_lid, solve
+from .references.lid_driven_cavity import LIDS, PROBE_RADIUS, solve
 from .table import Table, command
 
-LIDS = {"constant": constant_lid, "regularised": regularised_lid}
 SNAPSHOTS_PER_SECOND = 5
-PROBE_RADIUS = 3.0  # times dx
 TIME_STEP = {32: 3.125e-3, 50: 2e-3, 64: 1.5625e-3, 100: 2e-3}  # s; at 100 two thirds of the limit
 # name: (scheme, lid, Re, resolution, time before at half the resolution [s], end time [s])
 SETS = {

@@ -10,7 +10,6 @@ that all can be made in parts: the same command goes on.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import inspect
 from fnmatch import fnmatch
@@ -22,17 +21,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError
 from jaxsph.cli import (
     ARRANGEMENTS,
     SCALES,
-    fail,
     positive_float,
     positive_int,
-    report_errors,
 )
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 from jaxsph.scenes import SCENES
 from jaxsph_rom import (
     AdjointPetrovGalerkin,
@@ -50,47 +45,36 @@ from .measure import (
     format_rows,
     interacting_pairs,
     number,
-    read_json,
     summary,
     tell,
-    write_json,
 )
 from .references.source_paper import EXPERIMENTS, PROJECTIONS, Kind, PaperExperiment, Wanted
+from .table import Table, command
 
 _KEY = ("kind", "reynolds", "modes", "projection", "inner_product")
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a full run failed, 2: bad input."""
-    return report_errors("paper_rom", _command, argv)
+    return command("paper_rom", __doc__, _arguments, _run, argv, json="{scene}_{scale}.json")
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    name = f"{options.scene.replace('-', '_')}_{options.scale}.json"
-    path = options.json or Path("benchmarks", "results", name)
-    check_target(path)
+def _run(options) -> None:
     paper = EXPERIMENTS[options.scene]
     kinds = _kinds(paper, options)
     wanted = _wanted(paper.wanted(kinds), options)
-    with jax.enable_x64(True):
-        results = _started(path, options)
-        try:
-            for name, kind in kinds.items():
-                here = [case for case in wanted if case.kind == name]
-                if here:
-                    _run(path, results, options, kind, here)
-        except SimulationError as error:
-            return fail("paper_rom", f"full model: {error}", 1)
-    print(_table(results))
-    return 0
+    kept = Table(options.json, _KEY, settings=_settings(options), rows="cases")
+    kept.results.setdefault("cumulative_energy_percent", {})
+    if any(case["scene"] != options.scene for case in kept.rows):
+        raise ValueError(f"{options.json}: is of another scene; name another file with --json.")
+    for name, kind in kinds.items():
+        here = [case for case in wanted if case.kind == name]
+        if here:
+            _run_kind(kept, options, kind, here)
+    print(_table(kept.results))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.paper_rom", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("scene", choices=tuple(EXPERIMENTS), metavar="SCENE",
         help=f"one of {', '.join(EXPERIMENTS)}")  # fmt: skip
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
@@ -105,15 +89,12 @@ def _parser() -> argparse.ArgumentParser:
         help="of POD and projection (default: %(default)s, the paper's)")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/paper-rom-SCENE-SCALE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="default: benchmarks/results/SCENE_SCALE.json")  # fmt: skip
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
     add("--h-over-dx", type=positive_float, metavar="X", help="instead of the scale's")
     add("--end-time", type=positive_float, metavar="T", help="[s], instead of the scene's")
     add("--settling", type=positive_float, metavar="T", help="[s], instead of the scene's")
     add("--arrangement", choices=tuple(ARRANGEMENTS),
         help="how particles start (default: packed; in cavities the lattice)")  # fmt: skip
-    return parser
 
 
 def _kinds(paper: PaperExperiment, options) -> dict[str, Kind]:
@@ -160,55 +141,40 @@ def _settings(options) -> dict[str, Any]:
     return settings
 
 
-def _started(path: Path, options) -> dict[str, Any]:
-    """The results so far.
-
-    Raises:
-        ValueError: if the file holds results of other settings.
-    """
-    settings = _settings(options)
-    fresh = {"settings": settings, "cases": [], "cumulative_energy_percent": {}}
-    found = read_json(path) or fresh
-    scenes = {case["scene"] for case in found["cases"]} | {options.scene}
-    if found.get("settings") != settings or len(scenes) > 1:
-        raise ValueError(f"{path}: was made with other settings; name another file with --json.")
-    return found
-
-
-def _run(path: Path, results, options, kind: Kind, wanted: list[Wanted]) -> None:
+def _run_kind(kept: Table, options, kind: Kind, wanted: list[Wanted]) -> None:
     """Run what is not done yet of one kind, and write the file after each case."""
     name = wanted[0].kind
-    done = {tuple(case[key] for key in _KEY) for case in results["cases"]}
-    left = []
+    keys = {
+        case: (case.kind, case.reynolds, case.modes, case.projection, options.inner_product)
+        for case in wanted
+    }
+    left = [case for case in wanted if not kept.has(keys[case])]
     for case in wanted:
-        key = (case.kind, case.reynolds, case.modes, case.projection, options.inner_product)
-        if key in done:
+        if case not in left:
             tell(f"done before: {case.name}")
-        else:
-            left.append(case)
-    energy = results["cumulative_energy_percent"]
+    energy = kept.results["cumulative_energy_percent"]
     listed = name == "reconstructive" and options.inner_product not in energy
     if not left and not listed:
         return
     clocked = Clocked()
     plan = dataclasses.replace(PLANS[options.scene], borders=kind.borders)
     study = _study(options, plan, clocked)
-    results |= _scene_record(study, kind.trained_on[0]) | {"environment": environment()}
+    kept.results |= _scene_record(study, kind.trained_on[0]) | {"environment": environment()}
     for reynolds, modes, projections in _products(left):
         study.projections = tuple(_projection(projection, plan.tau) for projection in projections)
         asked = dataclasses.replace(plan, train=kind.trained_on, predict=reynolds, modes=modes)
         for experiment in asked.experiments():
             for outcome in study.run(experiment):
                 case = _record(options.scene, name, outcome, clocked.take())
-                results["cases"].append(case)
-                results["cases"].sort(key=_place)
-                write_json(path, results)
+                kept.rows.append(case)
+                kept.rows.sort(key=_place)
+                kept.write()
                 tell(f"written: {Wanted(name, *(case[key] for key in _KEY[1:4])).name}")
     if listed:
         paper = EXPERIMENTS[options.scene].energy
         experiment = Experiment(kind.trained_on, (), ())
         energy[options.inner_product] = _energies(study, experiment, paper)
-        write_json(path, results)
+        kept.write()
 
 
 def _place(case: dict[str, Any]) -> tuple:

@@ -9,11 +9,9 @@ slots of the list. `in order` is the right-hand side without `jaxsph.COMPILER_OP
 
 from __future__ import annotations
 
-import argparse
 import math
 import time as clock
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -23,7 +21,7 @@ import numpy as np
 from jax import lax
 
 from jaxsph import FullModel, ParticleState, SimulationError, simulate
-from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, report_errors
+from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, rk4_step
 from jaxsph.scenes import Scene, taylor_green
@@ -39,28 +37,23 @@ from .measure import (
     tell,
     write_json,
 )
+from .table import command
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("right_hand_side", _command, argv)
+    return command("right_hand_side", __doc__, _arguments, _run, argv, json=None)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
+def _run(options) -> None:
     with jax.enable_x64(options.precision == "float64"):
         results = measure(options)
     if options.json is not None:
         write_json(options.json, results)
     print(_table(results))
-    return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.right_hand_side", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--particles", type=positive_int, default=10_000, metavar="N",
         help="the nearest square is taken (default: %(default)s)")  # fmt: skip
     add("--h-over-dx", type=positive_float, default=4.0, metavar="X", help="default: %(default)g")
@@ -77,11 +70,9 @@ def _parser() -> argparse.ArgumentParser:
     add("--run-steps", type=int, default=0, metavar="K",
         help="first run so many steps (rounded up as well), so that the peak of memory is that of "
         "a run (default: 0)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE", help="write the results there")
-    return parser
 
 
-def measure(options: argparse.Namespace) -> dict[str, Any]:
+def measure(options) -> dict[str, Any]:
     """All figures, by the names under which they are written."""
     scene = taylor_green(
         max(1, round(math.sqrt(options.particles))),
@@ -91,7 +82,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         dtype=options.precision,
     )
     model = scene.model()
-    results: dict[str, Any] = {"run": _run(scene, options.run_steps)}
+    results: dict[str, Any] = {"run": _short_run(scene, options.run_steps)}
     peak = peak_memory_gib()  # before the derivatives add to it
     build, build_compile = compiled(model.search.build, scene.state.position)
     neighbors = build()
@@ -176,7 +167,7 @@ def _whole_intervals(scene: Scene, steps: int) -> int:
     return scene.steps_per_snapshot * -(-steps // scene.steps_per_snapshot)
 
 
-def _run(scene: Scene, steps: int) -> dict[str, Any] | None:
+def _short_run(scene: Scene, steps: int) -> dict[str, Any] | None:
     """A short run by the library's own loop."""
     if steps <= 0:
         return None

@@ -39,8 +39,8 @@ from jaxsph_rom.points import (
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, tell
+from .reduced_vortex import TRAINED_ON, discrepancies, make_scene, train
 from .table import Table, command
-from .tensor_rom import TRAINED_ON, discrepancies, make_scene, train
 
 SELECTIONS = {"q-deim": QDEIM, "non-negative": NonNegativeWeights}
 REFERENCES = ("tensors", "all points")

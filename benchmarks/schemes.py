@@ -50,7 +50,6 @@ from jaxsph.scenes import plane_flow_solution as plane
 from jaxsph.scenes import taylor_green_solution as vortex
 from jaxsph.schemes import SCHEMES
 
-from .lid_driven_cavity import LIDS, PROBE_RADIUS
 from .measure import (
     alternate,
     compiled,
@@ -58,7 +57,7 @@ from .measure import (
     number,
     progress,
 )
-from .references.lid_driven_cavity import solve
+from .references.lid_driven_cavity import LIDS, PROBE_RADIUS, solve
 from .references.taylor_green_3d import kinetic_energy
 from .table import Table, command
 

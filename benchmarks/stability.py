@@ -3,27 +3,26 @@
     python -m benchmarks.stability
     python -m benchmarks.stability --slow
 
-The table of `tests/stability/cases.py`, which the tests assert: a blow-up, an overflow or a NaN is
+The table of `hard_cases/cases.py`, which the tests assert: a blow-up, an overflow or a NaN is
 prevented or named, and never written to a file as a result. Cases that are done and have not
 changed since are not run again; the page is made anew from the results each time.
 """
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from jaxsph.cli import report_errors
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph_rom.report.plain import plain
-from tests.stability.cases import CASES
-from tests.stability.judge import Case, complaints, run_case
 
-from .measure import number, progress, read_json, tell, write_json
+from .hard_cases.cases import CASES
+from .hard_cases.judge import Case, complaints, run_case
+from .measure import number, progress, tell
+from .table import Table, command
 
 _HEAD = """# Hard cases
 
@@ -33,33 +32,32 @@ The promise: a blow-up, an overflow or a NaN is either prevented or named, and n
 file as a result. Each case below runs into a trajectory file that is then read back. It is
 *finished* within all its bounds, *refused* before it starts (`ValueError`), or ended by a named
 *fault* (`SimulationError`), whichever the case allows; no number in its file may be anything but
-finite. The cases are in `tests/stability`; quick ones run with the tests, long ones with
+finite. The cases are in `benchmarks/hard_cases`; quick ones run with the tests, long ones with
 `-m slow`.
 """
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 1: a case broke its promise, 2: bad input."""
-    return report_errors("stability", _command, argv)
+    return command("stability", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
+def _run(options) -> int:
     chosen = _chosen(options)
-    for path in (options.json, options.page):
-        check_target(path)
-    results = read_json(options.json) or {"cases": []}
-    rows = {row["name"]: row for row in results["cases"]}
-    left = [case for case in chosen if not _done(case, rows.get(case.name))]
-    tell(f"{len(chosen) - len(left)} of {len(chosen)} cases done before")
+    check_target(options.page)
+    kept = Table(options.json, ("name",), rows="cases")
+    changed = [case for case in chosen if not kept.has(_definition(case))]
+    tell(f"{len(chosen) - len(changed)} of {len(chosen)} cases done before")
+    order = list(CASES)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*allocated it anew")  # counted as `enlarged`
-        for case in left:
-            rows[case.name] = _row(case)
+        for case in changed:
+            row = _row(case)
             # in the table's order, and without cases that it no longer has
-            ordered = [rows[name] for name in CASES if name in rows]
-            write_json(options.json, {"cases": ordered})
-    rows = {name: rows[name] for name in CASES if name in rows}
+            others = [r for r in kept.rows if r["name"] in CASES and r["name"] != case.name]
+            kept.rows[:] = sorted((*others, row), key=lambda r: order.index(r["name"]))
+            kept.write()
+    rows = {row["name"]: row for row in kept.rows if row["name"] in CASES}
     options.page.parent.mkdir(parents=True, exist_ok=True)
     options.page.write_text(page(rows), encoding="utf-8")
     broken = [row for row in rows.values() if row["complaints"] and not row["wrong"]]
@@ -71,23 +69,13 @@ def _command(argv) -> int:
     return 1 if broken else 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.stability", description=__doc__.splitlines()[0]
-    )
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--slow", action="store_true", help="the long cases too")
-    add(
-        "--cases",
-        nargs="+",
-        metavar="PATTERN",
-        help="those whose names match, such as 'tank/*', long ones too (default: all quick ones)",
-    )
-    add("--json", type=Path, default=Path("benchmarks/results/stability.json"), metavar="FILE",
-        help="default: %(default)s")  # fmt: skip
+    add("--cases", nargs="+", metavar="PATTERN",
+        help="those whose names match, such as 'tank/*', long ones too "
+        "(default: all quick ones)")  # fmt: skip
     add("--page", type=Path, default=Path("docs/stability.md"), metavar="FILE",
         help="default: %(default)s")  # fmt: skip
-    return parser
 
 
 def _chosen(options) -> list[Case]:
@@ -122,10 +110,6 @@ def _definition(case: Case) -> dict[str, Any]:
         "bounds": bounds,
         "wrong": case.wrong,
     })  # fmt: skip
-
-
-def _done(case: Case, row: dict[str, Any] | None) -> bool:
-    return row is not None and all(row.get(k) == v for k, v in _definition(case).items())
 
 
 def _row(case: Case) -> dict[str, Any]:

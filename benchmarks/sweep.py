@@ -27,8 +27,8 @@ from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train
 from jaxsph_rom.study import full_run
 
 from .measure import format_rows, number, progress, summary, write_json
+from .reduced_vortex import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 from .table import command
-from .tensor_rom import HELD_BACK, TRAINED_ON, discrepancies, make_scene
 
 JUDGED = (110.0, 175.0, 240.0)
 _REPEATS = 3

@@ -11,7 +11,7 @@ from typing import Any
 import jax
 
 from jaxsph import SimulationError
-from jaxsph.cli import fail, report_errors
+from jaxsph.cli import Parser, fail, report_errors
 from jaxsph.io import check_target
 
 from .measure import read_json, tell, write_json
@@ -23,7 +23,7 @@ def command(
     arguments: Callable[[Callable], None],
     run: Callable[[argparse.Namespace], int | None],
     argv: list[str] | None,
-    json: str = "",
+    json: str | None = "",
 ) -> int:
     """Run `python -m benchmarks.NAME` in double precision; its exit code.
 
@@ -35,20 +35,22 @@ def command(
             None for 0. A full model that is lost in it gives 1.
         argv: of the command line.
         json: where results go unless `--json` says otherwise, {option} standing for an option's
-            value; `NAME.json` if it is not given.
+            value; `NAME.json` if it is not given, nowhere for None.
     """
-    where = f"benchmarks/results/{json or name + '.json'}"
+    where = "" if json is None else f"benchmarks/results/{json or name + '.json'}"
     shown = re.sub(r"{(\w+)}", lambda option: option[1].upper(), where)
     program = f"python -m benchmarks.{name}"
-    parser = argparse.ArgumentParser(program, description=about.partition("\n")[0])
+    parser = Parser(program, description=about.partition("\n")[0])
     arguments(parser.add_argument)
-    parser.add_argument("--json", type=Path, metavar="FILE", help=f"results (default: {shown})")
+    shown = f"results (default: {shown or 'none'})"
+    parser.add_argument("--json", type=Path, metavar="FILE", help=shown)
 
     def parsed() -> int:
         options = parser.parse_args(argv)
         values = {key: str(value).replace("-", "_") for key, value in vars(options).items()}
-        options.json = options.json or Path(where.format_map(values))
-        check_target(options.json)
+        options.json = options.json or (Path(where.format_map(values)) if where else None)
+        if options.json is not None:
+            check_target(options.json)
         try:
             with jax.enable_x64(True):
                 return int(run(options) or 0)

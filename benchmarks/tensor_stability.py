@@ -24,8 +24,8 @@ from jaxsph_rom.points import mapped_run
 from jaxsph_rom.study import full_run
 
 from .measure import progress, tell, write_json
+from .reduced_vortex import TRAINED_ON, make_scene, train
 from .table import command
-from .tensor_rom import TRAINED_ON, make_scene, train
 
 REYNOLDS = (100.0, 250.0, 10_000.0)
 TIMES_TRAINED = 10

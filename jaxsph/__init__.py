@@ -6,6 +6,10 @@ from . import integrate as integrate
 from . import kernels as kernels
 from . import scenes as scenes
 from . import schemes as schemes
+from .at_ghosts import AtGhost as AtGhost
+from .at_ghosts import Mirrored as Mirrored
+from .at_ghosts import Otherwise as Otherwise
+from .at_ghosts import Same as Same
 from .compiler_options import COMPILER_OPTIONS as COMPILER_OPTIONS
 from .domain import Box as Box
 from .fluid import Fluid as Fluid

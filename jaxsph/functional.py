@@ -21,8 +21,8 @@ from .walls import Walls
 class SPHFunctional(eqx.Module):
     """dw/dt = f(w, t; mu) for w = (position, velocity, density), the sum of the scene's effects.
 
-    It holds the sums that its effects ask for and no others: three passes over the pairs at most,
-    and where there are walls up to two over the ghosts before the second. Particles always move
+    It holds the sums that its effects ask for and no others: two passes over the pairs at most, and
+    where there are walls one over the ghosts before each. Particles always move
     with their velocity; all else is an effect.
 
     Args:
@@ -88,15 +88,24 @@ class SPHFunctional(eqx.Module):
                     rates[name] = rates[name] + rate
         return jax.tree.map(neighbors.unsort, ParticleState(**rates))
 
+    def context(
+        self,
+        time: Float[Array, ""],
+        walls: Walls | None = None,
+        pairs: VerletList | None = None,
+    ) -> Context:
+        """What its effects may know at a time [s], with walls and pairs of the fluid if given."""
+        bodies = None if walls is None else walls.bodies
+        forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
+        return Context(time, self.fluid, self.mass, self.space, bodies, forces, pairs)
+
     def sums(
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
-        """Context, fields and sums of the second and the last pass, in the list's sorted order."""
+        """Context, fields and sums of the second pass, in the list's sorted order."""
         state = jax.tree.map(neighbors.sort, state)
         walls = None if self.walls is None else self.walls.at(time)
-        bodies = None if walls is None else walls.bodies
-        forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
-        context = Context(time, self.fluid, self.mass, self.space, bodies, forces)
+        context = self.context(time, walls, neighbors if walls is None else neighbors.fluid)
         fields = {
             "position": state.position,
             "velocity": state.velocity,
@@ -104,72 +113,60 @@ class SPHFunctional(eqx.Module):
             "pressure": self.fluid.pressure(state.density),
             "volume": self.mass / state.density,
         }
-        ghosts = {} if walls is None else self._ghosts(context, walls, fields, neighbors)
+        ghosts = {} if walls is None else self._ghosts(walls, neighbors)
+        gathering = () if walls is None else self.effects
+        gathering = [(effect, effect.ghost_terms(context)) for effect in gathering]
+        known = fields.keys() | ghosts.keys()
+        first, second = [], []
+        for effect, terms in gathering:
+            ready = all(known.issuperset(term.reads) for term in terms)
+            (first if ready else second).append((effect, terms))
+        with jax.named_scope("ghost_pass"):
+            ghosts = _gathered(first, context, fields, ghosts, neighbors)
         with jax.named_scope("geometry_pass"):
-            sums = self._sums("geometry_terms", fields, ghosts, neighbors)
+            terms = tuple(t for e in self.effects for t in e.geometry_terms(context))
+            sums = _summed(terms, context, fields, ghosts, neighbors)
         for effect in self.effects if sums else ():
             with jax.named_scope(effect.name):
                 fields = fields | effect.fields(context, fields, sums)
-        ghosts = self._handed(context, fields, ghosts, neighbors)
+        with jax.named_scope("second_ghost_pass"):
+            ghosts = _gathered(second, context, fields, ghosts, neighbors)
         with jax.named_scope("rate_pass"):
-            sums = self._sums("rate_terms", fields, ghosts, neighbors)
-        terms = tuple(t for e in self.effects for t in e.closing_terms(self.space))
-        if terms:
-            for effect in self.effects:
-                with jax.named_scope(effect.name):
-                    fields = fields | effect.closing_fields(context, fields, sums)
-            with jax.named_scope("closing_pass"):
-                pairs = neighbors if self.walls is None else neighbors.fluid
-                sums = sums | pair_sum(terms, fields, self.space, pairs)
+            terms = tuple(t for e in self.effects for t in e.rate_terms(context))
+            sums = _summed(terms, context, fields, ghosts, neighbors)
         return context, fields, sums
 
-    def _sums(self, kind: str, fields, ghosts, neighbors) -> dict[str, Array]:
-        """The effects' sums of one pass, over particles and over ghosts."""
-        terms = tuple(t for e in self.effects for t in getattr(e, kind)(self.space))
-        if not terms:
-            return {}
-        if self.walls is None:
-            return pair_sum(terms, fields, self.space, neighbors)
-        sums = pair_sum(terms, fields, self.space, neighbors.fluid)
-        terms = self._wall_terms(f"wall_{kind}")
-        with jax.named_scope("walls"):
-            added = wall_sums(terms, fields, ghosts, self.space, neighbors.wall)
-        return added | {name: s + added[name] if name in added else s for name, s in sums.items()}
-
-    def _handed(self, context, fields, ghosts, neighbors) -> dict[str, Array]:
-        """Ghosts with what they gather of the first pass's fields."""
-        if self.walls is None:
-            return ghosts
-        terms = tuple(t for e in self.effects for t in e.handing_terms(self.space))
-        if not terms:
-            return ghosts
-        with jax.named_scope("handing_pass"):
-            sums = ghost_sums(terms, fields, ghosts, self.space, neighbors.wall)
-        for effect in self.effects:
-            with jax.named_scope(effect.name):
-                ghosts = ghosts | effect.handing_fields(context, ghosts, sums)
-        return ghosts
-
-    def _wall_terms(self, kind: str) -> tuple:
-        """The effects' terms of ghosts, of that kind; those for moving bodies where there are."""
-        kind = kind if self.walls.bodies is None else f"moving_{kind}"
-        return tuple(t for e in self.effects for t in getattr(e, kind)(self.space))
-
-    def _ghosts(self, context, walls: Walls, fields, neighbors: WallList) -> dict[str, Array]:
-        """Fields of the ghosts, as the wall effects give them."""
+    def _ghosts(self, walls: Walls, neighbors: WallList) -> dict[str, Array]:
+        """What ghosts have of the walls, and the volume of a particle at rest."""
         order = neighbors.wall.ghosts
         ghosts = {
             "position": walls.position[order],
             "normal": walls.normal[order],
             "wall_velocity": walls.velocity[order],
+            "volume": jnp.full(order.shape, self.mass / self.fluid.reference_density),
         }
         if walls.bodies is not None:
             acceleration = walls.bodies.of_ghosts(walls.bodies.acceleration)
             ghosts["wall_acceleration"] = acceleration[order]
-        terms = self._wall_terms("ghost_terms")
-        with jax.named_scope("ghost_pass"):
-            sums = ghost_sums(terms, fields, ghosts, self.space, neighbors.wall)
-        for effect in self.effects:
-            with jax.named_scope(effect.name):
-                ghosts = ghosts | effect.ghost_fields(context, ghosts, sums)
         return ghosts
+
+
+def _summed(terms, context, fields, ghosts, neighbors) -> dict[str, Array]:
+    """The sums of one pass, over particles and over ghosts."""
+    own = tuple(term for term in terms if term.function is not None)
+    sums = pair_sum(own, fields, context.space, context.pairs) if own else {}
+    if not ghosts or not terms:
+        return sums
+    with jax.named_scope("walls"):
+        added = wall_sums(terms, fields, ghosts, context.space, neighbors.wall)
+    return added | {name: s + added[name] if name in added else s for name, s in sums.items()}
+
+
+def _gathered(gathering, context, fields, ghosts, neighbors) -> dict[str, Array]:
+    """Ghosts with the fields that effects make of sums over the fluid around them."""
+    terms = tuple(t for _, terms in gathering for t in terms)
+    sums = ghost_sums(terms, fields, ghosts, context.space, neighbors.wall) if terms else {}
+    for effect, _ in gathering:
+        with jax.named_scope(effect.name):
+            ghosts = ghosts | effect.ghost_fields(context, ghosts, sums)
+    return ghosts

@@ -29,6 +29,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
+from .at_ghosts import AtGhost
 from .chunks import overlapping_map
 from .domain import Box
 from .kernels import Kernel
@@ -150,11 +151,15 @@ class PairTerm:
 
     `reads` names the fields of particles i and j that the function uses; only those are gathered.
     The function must be hashable by value (a module-level function or a frozen dataclass).
+
+    Where a scene has walls, `ghost` says what a ghost adds: `Same()`, `Mirrored(...)`,
+    `Otherwise(...)`, or nothing. A sum over ghosts alone has no `function`.
     """
 
     name: str
     reads: tuple[str, ...]
-    function: Callable
+    function: Callable | None
+    ghost: AtGhost | None = None
 
 
 def pair_sum(

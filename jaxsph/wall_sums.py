@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .effects import WallTerm
 from .neighbors import WallPairs
 from .pairs import PairTerm, Space, pair_sum
 
@@ -39,13 +38,17 @@ def ghost_sums(
 
 
 def wall_sums(
-    terms: tuple[WallTerm, ...],
+    terms: tuple[PairTerm, ...],
     fields: Mapping[str, Array],
     ghosts: Mapping[str, Array],
     space: Space,
     pairs: WallPairs,
 ) -> dict[str, Array]:
-    """Sums for each fluid particle over the ghosts near it; arguments as `ghost_sums`.
+    """Sums for each fluid particle over the ghosts near it, of the terms to which these add.
+
+    Args:
+        terms: the sums wanted; i is the particle, j the ghost.
+        fields, ghosts, space, pairs: as those of `ghost_sums`.
 
     Returns:
         for each term's name an array (N,) or (N, k), zero away from walls.
@@ -53,20 +56,21 @@ def wall_sums(
     Raises:
         ValueError: if a term reads a field that no effect gives the ghosts.
     """
+    terms = tuple(term for term in dict.fromkeys(terms) if term.ghost is not None)
     if not terms:
         return {}
-    terms = tuple(dict.fromkeys(terms))
-    missing = {name for term in terms for name in ("volume", *term.ghost_reads)} - set(ghosts)
+    needed = [name for term in terms for name in term.ghost.reads(term)]
+    missing = {"volume", *needed} - set(ghosts)
     if missing:
         raise ValueError(
             f"effects: the ghosts of a scene with walls need {', '.join(sorted(missing))}; list "
             "WallPressure, and one of NoSlip, FreeSlip and FixedWallVelocity."
         )
-    read = ["position", "volume"]
-    read += [name for term in terms for name in (*term.reads, *term.ghost_reads)]
+    read = ["position", "volume", *(name for term in terms for name in term.reads), *needed]
     table = _table(read, fields, ghosts, pairs)
     summed = tuple(
-        PairTerm(t.name, tuple(dict.fromkeys(t.reads + t.ghost_reads)), t.function) for t in terms
+        PairTerm(t.name, tuple(dict.fromkeys(t.reads + t.ghost.reads(t))), t.ghost.function(t))
+        for t in terms
     )
     near = pair_sum(summed, table, space, pairs, pairs.fluid_rows)
     count = fields["volume"].shape[0]

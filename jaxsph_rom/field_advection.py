@@ -5,13 +5,10 @@ from __future__ import annotations
 import abc
 from dataclasses import dataclass
 
-from jaxsph import PairTerm
-from jaxsph.effects import Effect, ShiftingTransport, WallTerm
-from jaxsph.effects.continuity import (
-    VELOCITY_DIVERGENCE,
-    WALL_DIVERGENCE,
-    reflected_divergence,
-)
+from jaxsph import Mirrored, Otherwise, PairTerm
+from jaxsph.at_ghosts import mirrored
+from jaxsph.effects import Effect, ShiftingTransport
+from jaxsph.effects.continuity import VELOCITY_DIVERGENCE
 
 
 def mass_flux(pair, i, j):
@@ -25,17 +22,10 @@ def momentum_flux(pair, i, j):
     return j.velocity * there + i.velocity * here
 
 
-def wall_mass_flux(pair, i, j):
-    """(rho_j u_j + rho_i u_i) . grad_i W_ij V_j with u_j = u_i - 2 (u_i . n_j) n_j"""
-    here = i.velocity.dot(pair.gradient)
-    there = here + reflected_divergence(pair, i, j)
-    return j.density * there + i.density * here
-
-
 def wall_momentum_flux(pair, i, j):
-    """(u_g (x) u_j + u_i (x) u_i) . grad_i W_ij V_j with u_j as above, u_g the ghost's velocity"""
+    """(u_g (x) u_j + u_i (x) u_i) . grad_i W_ij V_j, u_j the image of u_i, u_g the ghost's"""
+    there = mirrored(i.velocity, j.normal).dot(pair.gradient)
     here = i.velocity.dot(pair.gradient)
-    there = here + reflected_divergence(pair, i, j)
     return j.velocity * there + i.velocity * here
 
 
@@ -51,19 +41,13 @@ class FieldAdvection(Effect):
     the continuity equation; the velocity that is carried is the ghost's.
     """
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
+        velocity, momentum = ("velocity",), Otherwise(("normal", "velocity"), wall_momentum_flux)
+        mass = Mirrored("velocity")
         return (
             VELOCITY_DIVERGENCE,
-            PairTerm("mass_flux", ("velocity", "density"), mass_flux),
-            PairTerm("momentum_flux", ("velocity",), momentum_flux),
-        )
-
-    def wall_rate_terms(self, space):
-        velocity = ("velocity",)
-        return (
-            WALL_DIVERGENCE,
-            WallTerm("mass_flux", ("velocity", "density"), ("normal", "density"), wall_mass_flux),
-            WallTerm("momentum_flux", velocity, ("normal", "velocity"), wall_momentum_flux),
+            PairTerm("mass_flux", ("velocity", "density"), mass_flux, mass),
+            PairTerm("momentum_flux", velocity, momentum_flux, momentum),
         )
 
     def rates(self, context, fields, sums):

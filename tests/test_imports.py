@@ -77,6 +77,14 @@ def test_no_import_goes_round(package):
     tuple(TopologicalSorter(found).static_order())  # raises CycleError, which names the circle
 
 
+def test_no_benchmark_imports_another():
+    files = sources("benchmarks")
+    scripts = {name for name, text in files.items() if 'if __name__ == "__main__":' in text}
+    assert len(scripts) > 25
+    asked = graph(files)
+    assert not {name: asked[name] & scripts for name in scripts if asked[name] & scripts}
+
+
 @pytest.mark.parametrize(
     "first",
     [

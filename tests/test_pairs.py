@@ -27,7 +27,8 @@ EFFECTS = (
 
 def delta_plus_terms(space):
     """All ten sums of delta-plus-SPH, of both passes, as one pass."""
-    return tuple(t for e in EFFECTS for t in e.geometry_terms(space) + e.rate_terms(space))
+    context = effects.Context(None, None, None, space)
+    return tuple(t for e in EFFECTS for t in e.geometry_terms(context) + e.rate_terms(context))
 
 
 def make_space(dim, side, kernel=None, h_over_dx=1.1):

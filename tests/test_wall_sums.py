@@ -5,6 +5,7 @@ Last, a whole functional with walls: reverse mode in state, viscosity and lid ve
 
 from functools import lru_cache, partial
 from math import pi
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -12,9 +13,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import Box, PairTerm, ParticleState, Space, VerletList, WallList, effects
+from jaxsph import (
+    Box,
+    Mirrored,
+    Otherwise,
+    PairTerm,
+    ParticleState,
+    Same,
+    Space,
+    VerletList,
+    WallList,
+    effects,
+)
 from jaxsph.arrangements import JitteredLattice
-from jaxsph.effects import LaminarViscosity, WallTerm
+from jaxsph.effects import Context, LaminarViscosity
 from jaxsph.kernels import WendlandC2
 from jaxsph.neighbors import WallPairs
 from jaxsph.scenes import lid_driven_cavity
@@ -29,16 +41,15 @@ WITH_GHOSTS = (
     effects.ShiftingTransport(),
 )
 GIVING = (GRAVITY, effects.WallPressure(), effects.NoSlip())
-GHOST_TERMS = tuple(t for e in GIVING for t in e.ghost_terms(None))
+GHOST_TERMS = tuple(t for e in GIVING for t in e.ghost_terms(Context(None, None, None, None)))
 CASES = {"2d": (2, 10), "3d": (3, 6)}
 each_case = pytest.mark.parametrize("name", CASES)
 
 
 def wall_terms(space):
     """All sums over ghosts, of both passes, as one pass."""
-    return tuple(
-        t for e in WITH_GHOSTS for t in e.wall_geometry_terms(space) + e.wall_rate_terms(space)
-    )
+    context = Context(None, None, None, space)
+    return tuple(t for e in WITH_GHOSTS for t in e.geometry_terms(context) + e.rate_terms(context))
 
 
 class Case:
@@ -273,7 +284,7 @@ def test_vmap_equals_a_loop():
     lists = jax.tree.map(lambda a: jnp.stack([a] * 3), one.neighbors)
 
     def gradient(moved, neighbors):
-        terms = effects.LaminarViscosity(0.01).wall_rate_terms(None)
+        terms = effects.LaminarViscosity(0.01).rate_terms(None)
         return jax.grad(lambda m: inner(*[one.sums(m, neighbors, terms)] * 2))(moved)
 
     alone = jax.jit(gradient)
@@ -302,14 +313,62 @@ def test_no_terms_no_sums_and_equal_terms_once():
     one = case("2d")
     arguments = (one.fields, one.ghosts, one.space, one.neighbors.wall)
     assert ghost_sums((), *arguments) == {} == wall_sums((), *arguments)
-    first = WallTerm("same", ("pressure",), (), lambda pair, i, j: pair.kernel * i.pressure)
-    second = WallTerm("same", ("pressure",), (), lambda pair, i, j: pair.kernel)
+    first = PairTerm("same", ("pressure",), lambda pair, i, j: pair.kernel * i.pressure, Same())
+    second = PairTerm("same", ("pressure",), lambda pair, i, j: pair.kernel, Same())
     assert jax.eval_shape(lambda: wall_sums((first, first), *arguments))["same"].shape == (100,)
     with pytest.raises(ValueError, match="terms: two different terms share a name"):
         wall_sums((first, second), *arguments)
+    alone = PairTerm("alone", ("pressure",), lambda pair, i, j: pair.kernel * j.pressure)
+    assert wall_sums((alone,), *arguments) == {}, "a term that says nothing of ghosts"
     nowhere = PairTerm("lost", ("temperature",), lambda pair, i, j: j.temperature * pair.kernel)
     with pytest.raises(ValueError, match="temperature"):
         ghost_sums((nowhere,), *arguments)
+
+
+# ------------------------------------------------------------------ what a term does with ghosts
+
+
+def jump_and_flux(pair, i, j):
+    """(u_j - u_i) . g + (p_j u_j + p_i u_i) . g"""
+    flux = j.velocity.dot(pair.gradient) * j.pressure + i.velocity.dot(pair.gradient) * i.pressure
+    return (j.velocity - i.velocity).dot(pair.gradient) + flux
+
+
+@pytest.mark.parametrize("wall", [None, "wall_velocity"], ids=["resting", "moving"])
+def test_a_mirrored_vector_is_the_particles_own_reversed_at_the_wall(wall):
+    """Against the same sum with the image written out as a vector, and its derivative."""
+    one = case("2d")
+    rng = np.random.default_rng(3)
+    ghosts = one.ghosts | {
+        "wall_velocity": jnp.asarray(rng.normal(size=(60, 2)))[: len(one.ghosts["volume"])]
+    }
+
+    def written_out(pair, i, j):
+        slip = i.velocity - j.wall_velocity if wall else i.velocity
+        image = i.velocity - j.normal * (2.0 * slip.dot(j.normal))
+        return jump_and_flux(pair, i, SimpleNamespace(**vars(j) | {"velocity": image}))
+
+    reads = ("velocity", "pressure")
+    names = ("pressure", "normal", "wall_velocity")
+    of = [
+        PairTerm("found", reads, jump_and_flux, Mirrored("velocity", wall)),
+        PairTerm("exact", reads, jump_and_flux, Otherwise(names, written_out)),
+    ]
+    fields = jax.tree.map(one.neighbors.sort, one.fields)
+
+    def both(velocity):
+        sums = wall_sums(
+            tuple(of), fields | {"velocity": velocity}, ghosts, one.space, one.neighbors.wall
+        )
+        return sums["found"], sums["exact"]
+
+    (found, exact), (moved, moves) = jax.jvp(
+        both, (fields["velocity"],), (fields["velocity"][::-1],)
+    )
+    for a, b in ((found, exact), (moved, moves)):
+        # round-off of some ten summands
+        np.testing.assert_allclose(a, b, atol=1e-13 * float(jnp.max(jnp.abs(b))))
+        assert float(jnp.max(jnp.abs(b))) > 0.1
 
 
 # ------------------------------------------------------------------ a whole functional

@@ -8,16 +8,10 @@ of our own with noise where it says so. Results of problems that are not named s
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
-import jax
-
-from jaxsph.cli import report_errors
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 
 from ..measure import format_rows, number, read_json, write_json
+from ..table import command
 from . import initial_field, lid_profile, memory_and_closure, through_reduced, viscosity
 
 PROBLEMS = {
@@ -31,29 +25,23 @@ PROBLEMS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("inverse", _command, argv)
+    return command("inverse", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.inverse", description=__doc__.splitlines()[0]
-    )
-    parser.add_argument("problems", nargs="*", metavar="PROBLEM",
-                        help=f"of {', '.join(PROBLEMS)} (default: all)")  # fmt: skip
-    parser.add_argument("--json", type=Path, default=Path("benchmarks/results/inverse.json"),
-                        metavar="FILE", help="results (default: %(default)s)")  # fmt: skip
-    options = parser.parse_args(argv)
+def _arguments(add) -> None:
+    add("problems", nargs="*", metavar="PROBLEM",
+        help=f"of {', '.join(PROBLEMS)} (default: all)")  # fmt: skip
+
+
+def _run(options) -> None:
     unknown = [name for name in options.problems if name not in PROBLEMS]
     if unknown:
         raise ValueError(f"problem: {unknown[0]!r} is not one of {', '.join(PROBLEMS)}.")
-    check_target(options.json, overwrite=True)
     results = read_json(options.json) or {}
-    with jax.enable_x64(True):
-        for name in options.problems or PROBLEMS:
-            results[name] = PROBLEMS[name]() | {"environment": environment()}
-            write_json(options.json, results)
+    for name in options.problems or PROBLEMS:
+        results[name] = PROBLEMS[name]() | {"environment": environment()}
+        write_json(options.json, results)
     print(_table(results))
-    return 0
 
 
 def _table(results) -> str:

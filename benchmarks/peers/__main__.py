@@ -15,18 +15,15 @@ the reason. `python -m benchmarks.peers.setup` makes the peers' environments.
 
 from __future__ import annotations
 
-import argparse
 import os
 from pathlib import Path
 from typing import Any
 
-import jax
-
-from jaxsph.cli import Parser, positive_float, positive_int, report_errors
+from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.io import check_target
 
 from ..measure import format_rows, number, tell, write_json
+from ..table import command
 from .accuracy import accuracy_rows, at_equal_time
 from .protocol import SCHEMES
 from .speed import speed_row
@@ -35,21 +32,10 @@ from .workers import OURS, cores, find_codes
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("peers", _command, argv)
+    return command("peers", __doc__, _arguments, _run, argv)
 
 
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    check_target(options.json, overwrite=True)
-    with jax.enable_x64(True):
-        results = measure(options)
-    print(_table(results))
-    return 0
-
-
-def _parser() -> Parser:
-    parser = Parser("python -m benchmarks.peers", description=__doc__.splitlines()[0])
-    add = parser.add_argument
+def _arguments(add) -> None:
     add("--resolution", type=positive_int, nargs="+", default=[100], metavar="N",
         help="particles per side where right-hand sides are timed (default: 100)")  # fmt: skip
     add("--h-over-dx", type=positive_float, nargs="+", default=[2.0, 4.0], metavar="X",
@@ -71,12 +57,9 @@ def _parser() -> Parser:
     add("--jax-sph-python", type=Path, metavar="PATH",
         help="the Python that has what JAX-SPH needs (default: this one)")  # fmt: skip
     add("--pysph-python", type=Path, metavar="PATH", help="the Python that has PySPH")
-    add("--json", type=Path, default=Path("benchmarks/results/peers.json"), metavar="FILE",
-        help="default: %(default)s")  # fmt: skip
-    return parser
 
 
-def measure(options: argparse.Namespace) -> dict[str, Any]:
+def _run(options) -> None:
     """All figures, written after each case."""
     codes, missing = find_codes(options.jax_sph, options.jax_sph_python, options.pysph_python)
     for name, reason in missing.items():
@@ -116,7 +99,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             results["equal_time"] = at_equal_time(results["runs"])
             keep()
     keep()
-    return results
+    print(_table(results))
 
 
 def _table(results: dict[str, Any]) -> str:

@@ -60,6 +60,10 @@ def constant_lid(x: np.ndarray) -> np.ndarray:
     return np.ones_like(np.asarray(x, dtype=float))
 
 
+LIDS = {"constant": constant_lid, "regularised": regularised_lid}
+PROBE_RADIUS = 3.0  # times dx: about a point where a run is compared with these
+
+
 @dataclass(frozen=True)
 class CavityFlow:
     """A steady flow in the unit square, made by `solve`, to evaluate at any points (P, 2) in it.

@@ -22,13 +22,13 @@ from typing import Any
 import jax
 
 from jaxsph import SimulationError
-from jaxsph.cli import report_errors
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph_rom import advice
 from jaxsph_rom.report.plain import plain
 
 from ..measure import progress, read_json, tell, write_json
+from ..table import command
 from .full import run_full
 from .reduced import run_reduced
 from .report import PRESSURE, VELOCITY, figure, seconds_of, sound_rows, tables
@@ -37,54 +37,45 @@ from .settings import FULL, GRIDS, QUICK, Case, Grid, Setting, named
 
 def main(argv: list[str] | None = None) -> int:
     """Exit code 0: good, 2: bad input."""
-    return report_errors("work_precision", _command, argv)
-
-
-def _command(argv) -> int:
-    options = _parser().parse_args(argv)
-    grids = QUICK if options.quick else GRIDS
-    kind = "quick" if options.quick else "full"
-    path = options.json or Path("benchmarks", "results", f"work_precision_{kind}.json")
-    table = options.advice or (None if options.quick else advice.TABLE)
-    for target in filter(None, (path, table)):
-        check_target(target, overwrite=True)
-    folder = options.out or Path("out", f"work-precision-{kind}")
-    results = _started(path)
-    with jax.enable_x64(True):
-        for name in dict.fromkeys(options.scenes or grids):
-            run_scene(name, grids[name], results, path, folder)
-            case, rows = (results["scenes"][name][part] for part in ("case", "rows"))
-            print(tables(name, rows))
-            image = _image(options.figure, name, options.quick)
-            if image is not None:
-                figure(name, rows, case, image)
-                print(f"figure: {image}")
-    if table is not None:
-        write_json(table, compact(results, kind))
-        print(f"table of jaxsph-rom advise: {table}")
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "python -m benchmarks.work_precision", description=__doc__.splitlines()[0]
+    return command(
+        "work_precision", __doc__, _arguments, _run, argv, json="work_precision_{kind}.json"
     )
-    add = parser.add_argument
+
+
+def _run(options) -> None:
+    quick = options.kind == "quick"
+    grids = QUICK if quick else GRIDS
+    table = options.advice or (None if quick else advice.TABLE)
+    if table is not None:
+        check_target(table)
+    folder = options.out or Path("out", f"work-precision-{options.kind}")
+    results = _started(options.json)
+    for name in dict.fromkeys(options.scenes or grids):
+        run_scene(name, grids[name], results, options.json, folder)
+        case, rows = (results["scenes"][name][part] for part in ("case", "rows"))
+        print(tables(name, rows))
+        image = _image(options.figure, name, quick)
+        if image is not None:
+            figure(name, rows, case, image)
+            print(f"figure: {image}")
+    if table is not None:
+        write_json(table, compact(results, options.kind))
+        print(f"table of jaxsph-rom advise: {table}")
+
+
+def _arguments(add) -> None:
     add("scenes", nargs="*", type=_scene, metavar="SCENE",
         help=f"of {', '.join(GRIDS)} (default: all)")  # fmt: skip
-    add("--quick", action="store_true", help="a few settings at a tiny size, in some three minutes")
+    add("--quick", action="store_const", const="quick", default="full", dest="kind",
+        help="a few settings at a tiny size, in some three minutes")  # fmt: skip
     add("--out", type=Path, metavar="DIR",
         help="where training runs are kept (default: out/work-precision-KIND)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE",
-        help="results, and what is done already (default: "
-        "benchmarks/results/work_precision_KIND.json, KIND full or quick)")  # fmt: skip
     add("--figure", type=Path, metavar="FILE",
         help="one for each scene, its name added before the ending (default: "
         "docs/figures/work_precision.png; none with --quick)")  # fmt: skip
     add("--advice", type=Path, metavar="FILE",
         help="table of `jaxsph-rom advise` (default: the package's own; none with "
         "--quick)")  # fmt: skip
-    return parser
 
 
 def _scene(text: str) -> str:

@@ -1,7 +1,10 @@
 """Conservation of mass, at walls the adjoint of the pressure force."""
 
+from dataclasses import replace
+
+from ..at_ghosts import Otherwise
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect
 from .continuity import VELOCITY_DIVERGENCE
 from .wall_pressure import GHOST_WEIGHT, per_weight
 
@@ -45,13 +48,9 @@ class AdjointContinuity(Effect):
     across themselves with u_w, u is taken less u_w.
     """
 
-    def rate_terms(self, space):
-        return (VELOCITY_DIVERGENCE,)
-
-    def ghost_terms(self, space):
-        return (GHOST_WEIGHT, PairTerm("ghost_flux", ("velocity",), ghost_flux))
-
-    def moving_ghost_terms(self, space):
+    def ghost_terms(self, context):
+        if context.bodies is None:
+            return (GHOST_WEIGHT, PairTerm("ghost_flux", ("velocity",), ghost_flux))
         reads = ("velocity", "wall_velocity")
         return (GHOST_WEIGHT, PairTerm("ghost_flux", reads, moving_ghost_flux))
 
@@ -59,13 +58,11 @@ class AdjointContinuity(Effect):
         mean = per_weight(sums["ghost_flux"], sums["ghost_weight"], context.space)
         return {"gathered_flux": mean}
 
-    def wall_rate_terms(self, space):
-        flux = ("gathered_flux",)
-        return (WallTerm("velocity_divergence", ("velocity",), flux, wall_divergence),)
-
-    def moving_wall_rate_terms(self, space):
-        flux = ("gathered_flux", "wall_velocity")
-        return (WallTerm("velocity_divergence", ("velocity",), flux, moving_wall_divergence),)
+    def rate_terms(self, context):
+        handed = Otherwise(("gathered_flux",), wall_divergence)
+        if context.bodies is not None:
+            handed = Otherwise(("gathered_flux", "wall_velocity"), moving_wall_divergence)
+        return (replace(VELOCITY_DIVERGENCE, ghost=handed),)
 
     def rates(self, context, fields, sums):
         return {"density": -fields["density"] * sums["velocity_divergence"]}

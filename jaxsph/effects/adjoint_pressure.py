@@ -3,10 +3,11 @@
 import jax
 import jax.numpy as jnp
 
+from ..at_ghosts import Otherwise, Same
 from ..kernel_moments import lattice_moments
-from ..pairs import PairTerm
+from ..pairs import PairTerm, pair_sum
 from ..symmetric import product, times
-from .base import Effect, WallTerm, given
+from .base import Effect, given
 from .continuity import Continuity
 from .pressure_force import PressureForce
 from .wall_pressure import GHOST_WEIGHT, WallPressure, per_weight
@@ -69,11 +70,6 @@ def ghost_force(pair, i, j):
     return product(j.pressure_tensor, pair.gradient)
 
 
-def wall_smooth_divergence(pair, i, j):
-    """(s_g - s_i) . L_i grad_i W_ig V_g"""
-    return (j.mirrored_velocity - i.smooth_velocity).dot(product(i.correction, pair.gradient))
-
-
 def wall_rough_divergence(pair, i, j):
     """a_i . grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
     return i.rough_velocity.dot(pair.gradient) + j.handed_flux * (pair.kernel / i.volume)
@@ -91,6 +87,7 @@ _GATHERED = (
     PairTerm("ghost_flux", ("rough_velocity",), ghost_flux),
     PairTerm("ghost_force", ("pressure_tensor",), ghost_force),
 )
+_HANDED = (PairTerm("handed_force", ("smoothed_force",), handed_force),)
 
 
 class AdjointPressure(Effect):
@@ -132,7 +129,7 @@ class AdjointPressure(Effect):
         # in good order the plain pair is accurate, and each other's adjoint as it is
         return (Continuity(), PressureForce(), WallPressure())
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
         return (
             PairTerm("neighbor_share", (), neighbor_share),
             PairTerm("neighbor_velocity", ("velocity",), neighbor_velocity),
@@ -160,29 +157,27 @@ class AdjointPressure(Effect):
             "pressure_tensor": acting[:, None] * correction,
         }
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
         smooth = ("smooth_velocity", "correction")
+        mirrored = Otherwise(("smooth_velocity",), smooth_divergence)
+        rough, flux = ("rough_velocity",), Otherwise(("handed_flux",), wall_rough_divergence)
+        tensor, force = ("pressure_tensor",), Otherwise(("handed_force",), wall_pressure_flux)
         return (
-            PairTerm("smooth_divergence", smooth, smooth_divergence),
-            PairTerm("rough_divergence", ("rough_velocity",), rough_divergence),
-            PairTerm("pressure_difference", ("acting_pressure",), pressure_difference),
-            PairTerm("pressure_flux", ("pressure_tensor",), pressure_flux),
+            PairTerm("smooth_divergence", smooth, smooth_divergence, mirrored),
+            PairTerm("rough_divergence", rough, rough_divergence, flux),
+            PairTerm("pressure_difference", ("acting_pressure",), pressure_difference, Same()),
+            PairTerm("pressure_flux", tensor, pressure_flux, force),
         )
 
-    def ghost_fields(self, context, ghosts, sums):
-        volume = context.mass / context.fluid.reference_density
-        return {"volume": jnp.broadcast_to(volume, ghosts["position"].shape[:1])}
-
-    def moving_ghost_terms(self, space):
+    def ghost_terms(self, context):
+        if context.bodies is None:
+            return _GATHERED
         raise ValueError(
             "effects: AdjointPressure knows walls that rest or slide along themselves; for bodies "
             "that are moved through the fluid list Continuity and PressureForce."
         )
 
-    def handing_terms(self, space):
-        return _GATHERED
-
-    def handing_fields(self, context, ghosts, sums):
+    def ghost_fields(self, context, ghosts, sums):
         normal, space = ghosts["normal"], context.space
 
         def mean(total):
@@ -195,39 +190,23 @@ class AdjointPressure(Effect):
         volume = ghosts["volume"]
         return {
             "acting_pressure": mean(sums["ghost_mean_pressure"]),
-            "mirrored_velocity": mirrored(sums["ghost_mean_velocity"]),
+            "smooth_velocity": mirrored(sums["ghost_mean_velocity"]),
             "handed_flux": volume * mean(sums["ghost_flux"]),
             "handed_force": volume[:, None] * mirrored(sums["ghost_force"]),
         }
 
-    def wall_rate_terms(self, space):
-        smooth, pressure = ("smooth_velocity", "correction"), ("acting_pressure",)
-        rough, tensor = ("rough_velocity",), ("pressure_tensor",)
-        mirrored = ("mirrored_velocity",)
-        return (
-            WallTerm("smooth_divergence", smooth, mirrored, wall_smooth_divergence),
-            WallTerm("rough_divergence", rough, ("handed_flux",), wall_rough_divergence),
-            WallTerm("pressure_difference", pressure, pressure, pressure_difference),
-            WallTerm("pressure_flux", tensor, ("handed_force",), wall_pressure_flux),
-        )
-
-    def closing_fields(self, context, fields, sums):
+    def rates(self, context, fields, sums):
+        density, volume = fields["density"], fields["volume"]
         sharp = 1.0 + _sharpening(context.space)
         gradient = sharp * times(fields["correction"], sums["pressure_difference"])
         excess = sums["pressure_flux"] - gradient
-        return {
-            "sharp_gradient": gradient,
-            "smoothed_force": (fields["volume"][:, None] * fields["neighbor_weight"]) * excess,
-        }
-
-    def closing_terms(self, space):
-        return (PairTerm("handed_force", ("smoothed_force",), handed_force),)
-
-    def rates(self, context, fields, sums):
-        density, volume = fields["density"], fields["volume"]
+        smoothed = (volume[:, None] * fields["neighbor_weight"]) * excess
+        handed = pair_sum(
+            _HANDED, fields | {"smoothed_force": smoothed}, context.space, context.pairs
+        )
         alone = fields["neighbor_weight"] <= 0.0
-        gradient = jnp.where(alone, sums["pressure_flux"], fields["sharp_gradient"])
-        gradient = gradient + sums["handed_force"]
+        gradient = jnp.where(alone, sums["pressure_flux"], gradient)
+        gradient = gradient + handed["handed_force"]
         divergence = sums["smooth_divergence"] + sums["rough_divergence"]
         divergence = divergence - jnp.sum(volume * divergence) / jnp.sum(volume)
         velocity = -gradient / density[:, None]

@@ -4,8 +4,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
-from .base import Effect, WallTerm, viscous_step_limit
+from .base import Effect, viscous_step_limit
 from .laminar_viscosity import viscous_sum
 
 
@@ -25,11 +26,8 @@ class ArtificialViscosity(Effect):
         viscosity = self.alpha * space.smoothing_length * fluid.sound_speed
         return viscous_step_limit(viscosity / (2 * (space.box.dim + 2)), space)
 
-    def rate_terms(self, space):
-        return (PairTerm("viscous_sum", ("velocity",), viscous_sum),)
-
-    def wall_rate_terms(self, space):
-        return (WallTerm("viscous_sum", ("velocity",), ("velocity",), viscous_sum),)
+    def rate_terms(self, context):
+        return (PairTerm("viscous_sum", ("velocity",), viscous_sum, Same()),)
 
     def rates(self, context, fields, sums):
         fluid, h = context.fluid, context.space.smoothing_length

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .base import Effect
-from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
+from .kernel_gradient import KERNEL_GRADIENT
 
 
 class BackgroundPressure(Effect):
@@ -20,11 +20,8 @@ class BackgroundPressure(Effect):
 
     pressure: Float[Array, ""] = eqx.field(converter=jnp.asarray)
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
         return (KERNEL_GRADIENT,)
-
-    def wall_geometry_terms(self, space):
-        return (WALL_KERNEL_GRADIENT,)
 
     def fields(self, context, fields, sums):
         strength = -2.0 * self.pressure / fields["density"]

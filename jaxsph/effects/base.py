@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -11,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..fluid import Fluid
+from ..neighbors import VerletList
 from ..pairs import PairTerm, Space
 from ..walls.moving_body import Bodies
 
@@ -22,21 +22,9 @@ class Context(NamedTuple):
     fluid: Fluid
     mass: Float[Array, ""]
     space: Space
-    bodies: Bodies | None = None
+    bodies: Bodies | None = None  # walls that move across themselves
     forces: tuple[Effect, ...] = ()  # the scene's body forces
-
-
-class WallTerm(NamedTuple):
-    """What ghosts add to the sum of that name: `function(pair, i, j)` for particle i and ghost j.
-
-    `reads` names fields of the particle, `ghost_reads` those of the ghost. Positions, volumes,
-    normals and wall velocities are always there; the scene's wall effects give the others.
-    """
-
-    name: str
-    reads: tuple[str, ...]
-    ghost_reads: tuple[str, ...]
-    function: Callable
+    pairs: VerletList | None = None  # of the fluid, for an effect that needs a further sum
 
 
 def given(fields: dict, name: str, reader: Effect, giver: str) -> Array:
@@ -61,20 +49,19 @@ def viscous_step_limit(viscosity, space: Space):
 
 
 class Effect(eqx.Module):
-    """A part of the SPH functional, in at most three passes over the pairs.
+    """A part of the SPH functional, in two passes over the pairs.
 
     The first pass sees positions, densities, pressures, volumes and velocities; what an effect
     makes of its sums (`fields`) is there for the second pass, whose sums become rates of change of
-    position [m/s], velocity [m/s^2] and density [kg/m^3/s].
+    position [m/s], velocity [m/s^2] and density [kg/m^3/s]. One that needs more sums has
+    `context.pairs` for them.
 
-    Where a scene has walls, a pass over the ghosts comes first: its sums over fluid particles
-    (`ghost_terms`) give the ghosts their values (`ghost_fields`); and in both other passes ghosts
-    add to the sums what an effect's `wall_geometry_terms` and `wall_rate_terms` say. Ghosts may
-    gather once more what the first pass has made (`handing_terms`, `handing_fields`) and hand it on
-    in the second. Without walls none of these is called. A last pass over the fluid's pairs
-    (`closing_terms`) may read fields made of the second's sums (`closing_fields`). Where bodies are
-    moved through the fluid, ghosts have a `wall_acceleration` [m/s^2] as well, and the `moving_`
-    forms of these methods are called.
+    Where a scene has walls, ghosts gather sums over the fluid particles near them first
+    (`ghost_terms`), which give them their values (`ghost_fields`); in both passes they then add to
+    a sum what its term says. Without walls neither is called.
+
+    Which sums are wanted may hang on what of the context is static: its space, and whether there
+    are forces and bodies.
 
     Coefficients that one may sweep or differentiate are array fields; what changes the structure
     of the computation is static.
@@ -108,7 +95,7 @@ class Effect(eqx.Module):
         """The same as far as it hangs on where particles start."""
         return math.inf
 
-    def geometry_terms(self, space: Space) -> tuple[PairTerm, ...]:
+    def geometry_terms(self, context: Context) -> tuple[PairTerm, ...]:
         """Sums wanted of the first pass."""
         return ()
 
@@ -116,54 +103,21 @@ class Effect(eqx.Module):
         """New per-particle fields made of the first pass's sums."""
         return {}
 
-    def rate_terms(self, space: Space) -> tuple[PairTerm, ...]:
+    def rate_terms(self, context: Context) -> tuple[PairTerm, ...]:
         """Sums wanted of the second pass."""
         return ()
 
-    def ghost_terms(self, space: Space) -> tuple[PairTerm, ...]:
-        """Sums wanted for each ghost i over the fluid particles j near it."""
+    def rates(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
+        """Contributions to the rates of `position`, `velocity` and `density`."""
+        return {}
+
+    def ghost_terms(self, context: Context) -> tuple[PairTerm, ...]:
+        """Sums wanted for each ghost i over the fluid particles j near it.
+
+        Where an effect's sums read what the first pass has made, its ghosts gather after that.
+        """
         return ()
 
     def ghost_fields(self, context: Context, ghosts: dict, sums: dict) -> dict[str, Array]:
         """New fields of the ghosts made of these sums."""
-        return {}
-
-    def wall_geometry_terms(self, space: Space) -> tuple[WallTerm, ...]:
-        """What ghosts add to sums of the first pass."""
-        return ()
-
-    def wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
-        """What ghosts add to sums of the second pass."""
-        return ()
-
-    def handing_terms(self, space: Space) -> tuple[PairTerm, ...]:
-        """Sums wanted for each ghost i over the fluid particles j, of the first pass's fields."""
-        return ()
-
-    def handing_fields(self, context: Context, ghosts: dict, sums: dict) -> dict[str, Array]:
-        """New fields of the ghosts made of these sums, for the second pass."""
-        return {}
-
-    def closing_fields(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
-        """New per-particle fields made of the second pass's sums, for the last."""
-        return {}
-
-    def closing_terms(self, space: Space) -> tuple[PairTerm, ...]:
-        """Sums wanted of the last pass."""
-        return ()
-
-    def moving_ghost_terms(self, space: Space) -> tuple[PairTerm, ...]:
-        """`ghost_terms` where walls move across themselves."""
-        return self.ghost_terms(space)
-
-    def moving_wall_geometry_terms(self, space: Space) -> tuple[WallTerm, ...]:
-        """`wall_geometry_terms` where walls move across themselves."""
-        return self.wall_geometry_terms(space)
-
-    def moving_wall_rate_terms(self, space: Space) -> tuple[WallTerm, ...]:
-        """`wall_rate_terms` where walls move across themselves."""
-        return self.wall_rate_terms(space)
-
-    def rates(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
-        """Contributions to the rates of `position`, `velocity` and `density`."""
         return {}

@@ -36,7 +36,7 @@ class BodyForce(Effect):
     ) -> Float[Array, "points dim"]:
         """b [m/s^2] at a time [s] and at positions [m]."""
 
-    def ghost_terms(self, space):
+    def ghost_terms(self, context):
         return (GHOST_MOMENT,)
 
     def rates(self, context, fields, sums):

@@ -2,10 +2,12 @@
 
 import jax.numpy as jnp
 
+from ..at_ghosts import Otherwise
+from ..pairs import PairTerm
 from ..ramps import ramp
 from ..symmetric import along
 from .adjoint_pressure import neighbor_share
-from .base import Effect, WallTerm, given
+from .base import Effect, given
 
 _NEAR = (0.95, 1.0)  # of the kernel's sum that is fluid's
 
@@ -25,8 +27,8 @@ class ConsistentTransport(Effect):
     def on_fixed_points(self):
         return ()  # nothing is shifted there
 
-    def wall_geometry_terms(self, space):
-        return (WallTerm("wall_share", (), (), neighbor_share),)
+    def geometry_terms(self, context):
+        return (PairTerm("wall_share", (), None, Otherwise((), neighbor_share)),)
 
     def fields(self, context, fields, sums):
         given(fields, "velocity_gradient", self, "KernelCorrection")

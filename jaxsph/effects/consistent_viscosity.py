@@ -6,10 +6,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..at_ghosts import Same
 from ..kernel_moments import lattice_moments, slope_moment
 from ..pairs import PairTerm
 from ..symmetric import along
-from .base import Effect, WallTerm, given, viscous_step_limit
+from .base import Effect, given, viscous_step_limit
 
 _LEAST = 0.1  # of a trace, which few neighbours leave near zero
 _LEAST_ON_LATTICE = 0.25  # 0.5 to 0.7 where neighbours are enough
@@ -74,16 +75,11 @@ class ConsistentViscosity(Effect):
         _weight(space)  # a scene refuses here what it could not run
         return viscous_step_limit(self.viscosity, space)
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
+        weight = _weight(context.space)
         return (
-            PairTerm("sharp_trace", (), SharpTrace(_weight(space))),
-            PairTerm("sharp_gradient", (), SharpGradient(_weight(space))),
-        )
-
-    def wall_geometry_terms(self, space):
-        return (
-            WallTerm("sharp_trace", (), (), SharpTrace(_weight(space))),
-            WallTerm("sharp_gradient", (), (), SharpGradient(_weight(space))),
+            PairTerm("sharp_trace", (), SharpTrace(weight), Same()),
+            PairTerm("sharp_gradient", (), SharpGradient(weight), Same()),
         )
 
     def fields(self, context, fields, sums):
@@ -91,12 +87,9 @@ class ConsistentViscosity(Effect):
         linear = along(gradient, sums["sharp_gradient"])
         return {"sharp_trace": sums["sharp_trace"], "linear_part": linear}
 
-    def rate_terms(self, space):
-        return (PairTerm("sharp_laplacian", ("velocity",), SharpLaplacian(_weight(space))),)
-
-    def wall_rate_terms(self, space):
-        velocity = ("velocity",)
-        return (WallTerm("sharp_laplacian", velocity, velocity, SharpLaplacian(_weight(space))),)
+    def rate_terms(self, context):
+        laplacian = SharpLaplacian(_weight(context.space))
+        return (PairTerm("sharp_laplacian", ("velocity",), laplacian, Same()),)
 
     def rates(self, context, fields, sums):
         factor = 2.0 * context.space.box.dim * self.viscosity * context.fluid.reference_density

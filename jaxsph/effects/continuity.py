@@ -1,7 +1,10 @@
 """Conservation of mass."""
 
+from dataclasses import replace
+
+from ..at_ghosts import Mirrored
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect
 
 
 def velocity_divergence(pair, i, j):
@@ -9,22 +12,8 @@ def velocity_divergence(pair, i, j):
     return (j.velocity - i.velocity).dot(pair.gradient)
 
 
-def reflected_divergence(pair, i, j):
-    """-2 (u_i . n_j) (n_j . grad_i W_ij) V_j"""
-    return i.velocity.dot(j.normal) * j.normal.dot(pair.gradient) * -2.0
-
-
-def moving_divergence(pair, i, j):
-    """-2 ((u_i - u_w) . n_j) (n_j . grad_i W_ij) V_j, u_w the velocity of the wall at j"""
-    approach = (i.velocity - j.wall_velocity).dot(j.normal)
-    return approach * j.normal.dot(pair.gradient) * -2.0
-
-
-VELOCITY_DIVERGENCE = PairTerm("velocity_divergence", ("velocity",), velocity_divergence)
-WALL_DIVERGENCE = WallTerm("velocity_divergence", ("velocity",), ("normal",), reflected_divergence)
-
-MOVING_DIVERGENCE = WallTerm(
-    "velocity_divergence", ("velocity",), ("normal", "wall_velocity"), moving_divergence
+VELOCITY_DIVERGENCE = PairTerm(
+    "velocity_divergence", ("velocity",), velocity_divergence, Mirrored("velocity")
 )
 
 
@@ -37,14 +26,10 @@ class Continuity(Effect):
     walls move across themselves with u_w, the part reversed is that of u_i - u_w.
     """
 
-    def rate_terms(self, space):
-        return (VELOCITY_DIVERGENCE,)
-
-    def wall_rate_terms(self, space):
-        return (WALL_DIVERGENCE,)
-
-    def moving_wall_rate_terms(self, space):
-        return (MOVING_DIVERGENCE,)
+    def rate_terms(self, context):
+        if context.bodies is None:
+            return (VELOCITY_DIVERGENCE,)
+        return (replace(VELOCITY_DIVERGENCE, ghost=Mirrored("velocity", "wall_velocity")),)
 
     def rates(self, context, fields, sums):
         return {"density": -fields["density"] * sums["velocity_divergence"]}

@@ -44,7 +44,7 @@ class DensityDiffusion(Effect):
 
     delta: Float[Array, ""] = eqx.field(converter=jnp.asarray)
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
         return (
             RENORMALISATION,
             PairTerm("raw_density_gradient", ("density",), raw_density_gradient),
@@ -54,7 +54,7 @@ class DensityDiffusion(Effect):
         correction = inverse(sums["renormalisation"], singular=0.0)
         return {"density_gradient": times(correction, sums["raw_density_gradient"])}
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
         reads = ("density", "density_gradient")
         return (PairTerm("diffusion_sum", reads, diffusion_sum),)
 

@@ -2,11 +2,12 @@
 
 import jax.numpy as jnp
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
 from ..ramps import ramp, root
 from ..vector import Vector
-from .base import Effect, WallTerm
-from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
+from .base import Effect
+from .kernel_gradient import KERNEL_GRADIENT
 
 _SPLASH = (0.25, 0.4)  # of completeness: single particles and thin jets lie below
 _INTERIOR = (0.95, 0.995)  # 0.50, 0.70, 0.94, 0.999 in the rows under a flat surface, h = 2 dx
@@ -47,11 +48,8 @@ class FreeSurface(Effect):
             "there; choose a scene whose fluid fills its box or vessel."
         )
 
-    def geometry_terms(self, space):
-        return (PairTerm("support_matrix", (), support_matrix), KERNEL_GRADIENT)
-
-    def wall_geometry_terms(self, space):
-        return (WallTerm("support_matrix", (), (), support_matrix), WALL_KERNEL_GRADIENT)
+    def geometry_terms(self, context):
+        return (PairTerm("support_matrix", (), support_matrix, Same()), KERNEL_GRADIENT)
 
     def fields(self, context, fields, sums):
         if "tensile_release" in fields:  # it would have taken the surface for the inside

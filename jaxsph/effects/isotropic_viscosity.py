@@ -4,8 +4,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
-from .base import Effect, WallTerm, viscous_step_limit
+from .base import Effect, viscous_step_limit
 
 
 def laplacian_sum(pair, i, j):
@@ -30,11 +31,8 @@ class IsotropicViscosity(Effect):
     def step_limit(self, fluid, space):
         return viscous_step_limit(self.viscosity, space)
 
-    def rate_terms(self, space):
-        return (PairTerm("laplacian_sum", ("velocity",), laplacian_sum),)
-
-    def wall_rate_terms(self, space):
-        return (WallTerm("laplacian_sum", ("velocity",), ("velocity",), laplacian_sum),)
+    def rate_terms(self, context):
+        return (PairTerm("laplacian_sum", ("velocity",), laplacian_sum, Same()),)
 
     def rates(self, context, fields, sums):
         factor = 2.0 * self.viscosity * context.fluid.reference_density / fields["density"]

@@ -2,10 +2,11 @@
 
 import jax.numpy as jnp
 
+from ..at_ghosts import Otherwise, Same
 from ..pairs import PairTerm
 from ..symmetric import inverse, times
 from ..vector import Vector
-from .base import Effect, WallTerm
+from .base import Effect
 from .density_diffusion import RENORMALISATION, renormalisation
 
 
@@ -25,18 +26,11 @@ class KernelCorrection(Effect):
     few neighbours leave none), and `velocity_gradient` (N, n, n) [1/s], rows by component.
     """
 
-    def geometry_terms(self, space):
-        velocity = ("velocity",)
+    def geometry_terms(self, context):
         return (
             RENORMALISATION,
-            PairTerm("raw_velocity_gradient", velocity, raw_velocity_gradient),
-        )
-
-    def wall_geometry_terms(self, space):
-        velocity = ("velocity",)
-        return (
-            WallTerm("wall_renormalisation", (), (), renormalisation),
-            WallTerm("raw_velocity_gradient", velocity, velocity, raw_velocity_gradient),
+            PairTerm("wall_renormalisation", (), None, Otherwise((), renormalisation)),
+            PairTerm("raw_velocity_gradient", ("velocity",), raw_velocity_gradient, Same()),
         )
 
     def fields(self, context, fields, sums):

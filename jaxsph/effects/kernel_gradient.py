@@ -1,7 +1,7 @@
 """The sum of kernel gradients: zero among evenly spread particles, else towards the gaps."""
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
-from .base import WallTerm
 
 
 def kernel_gradient(pair, i, j):
@@ -9,5 +9,4 @@ def kernel_gradient(pair, i, j):
     return pair.gradient
 
 
-KERNEL_GRADIENT = PairTerm("kernel_gradient", (), kernel_gradient)
-WALL_KERNEL_GRADIENT = WallTerm("kernel_gradient", (), (), kernel_gradient)
+KERNEL_GRADIENT = PairTerm("kernel_gradient", (), kernel_gradient, Same())

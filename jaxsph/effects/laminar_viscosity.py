@@ -4,8 +4,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
-from .base import Effect, WallTerm, viscous_step_limit
+from .base import Effect, viscous_step_limit
 from .isotropic_viscosity import IsotropicViscosity
 
 
@@ -32,11 +33,8 @@ class LaminarViscosity(Effect):
     def step_limit(self, fluid, space):
         return viscous_step_limit(self.viscosity, space)
 
-    def rate_terms(self, space):
-        return (PairTerm("viscous_sum", ("velocity",), viscous_sum),)
-
-    def wall_rate_terms(self, space):
-        return (WallTerm("viscous_sum", ("velocity",), ("velocity",), viscous_sum),)
+    def rate_terms(self, context):
+        return (PairTerm("viscous_sum", ("velocity",), viscous_sum, Same()),)
 
     def rates(self, context, fields, sums):
         factor = 2.0 * (context.space.box.dim + 2) * self.viscosity

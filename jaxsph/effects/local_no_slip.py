@@ -61,8 +61,8 @@ class LocalNoSlip(Effect):
 
     fluid_region: Region = eqx.field(static=True)
 
-    def ghost_terms(self, space):
-        scale = 1.0 / space.kernel_at_spacing
+    def ghost_terms(self, context):
+        scale = 1.0 / context.space.kernel_at_spacing
         return (
             PairTerm("near_weight", (), NearWeight(scale)),
             PairTerm("near_velocity", ("velocity",), NearVelocity(scale)),

@@ -37,8 +37,8 @@ class PairRepulsion(Effect):
     def on_fixed_points(self):
         return ()  # points lie evenly
 
-    def rate_terms(self, space):
-        return (PairTerm("closeness", (), Closeness(_RANGE * space.spacing)),)
+    def rate_terms(self, context):
+        return (PairTerm("closeness", (), Closeness(_RANGE * context.space.spacing)),)
 
     def rates(self, context, fields, sums):
         strength = _STRENGTH * (context.fluid.sound_speed / context.space.smoothing_length) ** 2

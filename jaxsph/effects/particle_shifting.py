@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
+from ..at_ghosts import Same
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class ShiftingSum:
 
 def shifting_term(space) -> PairTerm:
     """The sum that the shift velocity follows."""
-    return PairTerm("shifting_sum", (), shifting_sum(space))
+    return PairTerm("shifting_sum", (), ShiftingSum(0.2 / space.kernel_at_spacing), Same())
 
 
 def shift_velocity(total, space, speed):
@@ -52,11 +53,8 @@ class ParticleShifting(Effect):
     def on_fixed_points(self):
         return ()  # points are spread as they are
 
-    def geometry_terms(self, space):
-        return (shifting_term(space),)
-
-    def wall_geometry_terms(self, space):
-        return (WallTerm("shifting_sum", (), (), shifting_sum(space)),)
+    def geometry_terms(self, context):
+        return (shifting_term(context.space),)
 
     def fields(self, context, fields, sums):
         speed = context.fluid.reference_speed
@@ -64,8 +62,3 @@ class ParticleShifting(Effect):
 
     def rates(self, context, fields, sums):
         return {"position": fields["shift_velocity"]}
-
-
-def shifting_sum(space) -> ShiftingSum:
-    """Its function."""
-    return ShiftingSum(0.2 / space.kernel_at_spacing)

@@ -1,7 +1,8 @@
 """What density and momentum lose and gain because particles are shifted."""
 
+from ..at_ghosts import Mirrored
 from ..pairs import PairTerm
-from .base import Effect, WallTerm
+from .base import Effect
 
 
 def shift_divergence(pair, i, j):
@@ -23,23 +24,7 @@ def shift_momentum_flux(pair, i, j):
     return j.velocity * there + i.velocity * here
 
 
-def reflected_shift_divergence(pair, i, j):
-    """-2 (du_i . n_j) (n_j . grad_i W_ij) V_j"""
-    return i.shift_velocity.dot(j.normal) * j.normal.dot(pair.gradient) * -2.0
-
-
-def wall_shift_mass_flux(pair, i, j):
-    """(rho_j du_j + rho_i du_i) . grad_i W_ij V_j with du_j = du_i - 2 (du_i . n_j) n_j"""
-    here = i.shift_velocity.dot(pair.gradient)
-    there = here + reflected_shift_divergence(pair, i, j)
-    return j.density * there + i.density * here
-
-
-def wall_shift_momentum_flux(pair, i, j):
-    """(u_j (x) du_j + u_i (x) du_i) . grad_i W_ij V_j with du_j as above"""
-    here = i.shift_velocity.dot(pair.gradient)
-    there = here + reflected_shift_divergence(pair, i, j)
-    return j.velocity * there + i.velocity * here
+_SHIFT = Mirrored("shift_velocity")
 
 
 class ShiftingTransport(Effect):
@@ -58,26 +43,12 @@ class ShiftingTransport(Effect):
     def on_fixed_points(self):
         return ()  # nothing is shifted there
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
+        shift, density, velocity = "shift_velocity", "density", "velocity"
         return (
-            PairTerm("shift_divergence", ("shift_velocity",), shift_divergence),
-            PairTerm("shift_mass_flux", ("shift_velocity", "density"), shift_mass_flux),
-            PairTerm("shift_momentum_flux", ("velocity", "shift_velocity"), shift_momentum_flux),
-        )
-
-    def wall_rate_terms(self, space):
-        shift = "shift_velocity"
-        return (
-            WallTerm("shift_divergence", (shift,), ("normal",), reflected_shift_divergence),
-            WallTerm(
-                "shift_mass_flux", (shift, "density"), ("normal", "density"), wall_shift_mass_flux
-            ),
-            WallTerm(
-                "shift_momentum_flux",
-                (shift, "velocity"),
-                ("normal", "velocity"),
-                wall_shift_momentum_flux,
-            ),
+            PairTerm("shift_divergence", (shift,), shift_divergence, _SHIFT),
+            PairTerm("shift_mass_flux", (shift, density), shift_mass_flux, _SHIFT),
+            PairTerm("shift_momentum_flux", (velocity, shift), shift_momentum_flux, _SHIFT),
         )
 
     def rates(self, context, fields, sums):

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 
 from ..ramps import root
-from .base import Effect, WallTerm, given
-from .particle_shifting import limited, shifting_sum, shifting_term
+from .base import Effect, given
+from .particle_shifting import limited, shifting_term
 
 _STRENGTH = 12.0  # at h = 2 dx: U where the flow changes by U over 24 dx
 
@@ -23,11 +23,8 @@ class StrainShifting(Effect):
     def on_fixed_points(self):
         return ()  # points are spread as they are
 
-    def geometry_terms(self, space):
-        return (shifting_term(space),)
-
-    def wall_geometry_terms(self, space):
-        return (WallTerm("shifting_sum", (), (), shifting_sum(space)),)
+    def geometry_terms(self, context):
+        return (shifting_term(context.space),)
 
     def fields(self, context, fields, sums):
         gradient = given(fields, "velocity_gradient", self, "KernelCorrection")

@@ -57,7 +57,7 @@ class SurfaceTension(Effect):
         wave = fluid.reference_density * space.smoothing_length**3
         return jnp.sqrt(wave / (2.0 * jnp.pi * self.tension))
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
         return (KERNEL_GRADIENT,)
 
     def fields(self, context, fields, sums):
@@ -69,7 +69,7 @@ class SurfaceTension(Effect):
             "surface_gradient": ramp(seen, *_FADED)[:, None] * gradient,
         }
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
         return (
             PairTerm("tangent_matrix", ("surface_share",), tangent_matrix),
             PairTerm("normal_slope", ("surface_share", "surface_normal"), normal_slope),

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from .base import Effect
-from .kernel_gradient import KERNEL_GRADIENT, WALL_KERNEL_GRADIENT
+from .kernel_gradient import KERNEL_GRADIENT
 
 
 class TensileControl(Effect):
@@ -17,11 +17,8 @@ class TensileControl(Effect):
     without `FreeSurface` has s = 1.
     """
 
-    def geometry_terms(self, space):
+    def geometry_terms(self, context):
         return (KERNEL_GRADIENT,)
-
-    def wall_geometry_terms(self, space):
-        return (WALL_KERNEL_GRADIENT,)
 
     def fields(self, context, fields, sums):
         tension = 2.0 * jnp.minimum(fields["pressure"], 0.0) / fields["density"]

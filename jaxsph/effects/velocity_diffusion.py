@@ -47,7 +47,7 @@ class VelocityDiffusion(Effect):
         share = fields.get("coherent", jnp.ones_like(fields["density"]))
         return {"strain": symmetric[:, rows, columns], "diffused": share}
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
         reads = ("velocity", "strain", "diffused")
         return (PairTerm("velocity_diffusion", reads, velocity_diffusion),)
 

@@ -38,11 +38,8 @@ class WallPressure(Effect):
     ghost out of reach of the fluid has p = 0.
     """
 
-    def ghost_terms(self, space):
-        return _MEAN
-
-    def moving_ghost_terms(self, space):
-        return (*_MEAN, GHOST_MOMENT)
+    def ghost_terms(self, context):
+        return _MEAN if context.bodies is None else (*_MEAN, GHOST_MOMENT)
 
     def ghost_fields(self, context, ghosts, sums):
         pressure, position = sums["ghost_pressure"], ghosts["position"]

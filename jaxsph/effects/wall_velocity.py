@@ -29,7 +29,7 @@ class NoSlip(Effect):
     keeps it near zero.
     """
 
-    def ghost_terms(self, space):
+    def ghost_terms(self, context):
         return (GHOST_WEIGHT, PairTerm("ghost_velocity", ("velocity",), ghost_velocity))
 
     def ghost_fields(self, context, ghosts, sums):
@@ -57,7 +57,7 @@ class FreeSlip(Effect):
     moved, the normal part reversed is that of the mean less the wall's velocity.
     """
 
-    def ghost_terms(self, space):
+    def ghost_terms(self, context):
         return (GHOST_WEIGHT, PairTerm("ghost_velocity", ("velocity",), ghost_velocity))
 
     def ghost_fields(self, context, ghosts, sums):

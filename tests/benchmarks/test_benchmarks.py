@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -130,8 +131,7 @@ def test_cases_of_the_paper(scene):
 
 
 def test_cases_at_a_scale():
-    arguments = ["taylor-green", "--scale", "half", "--cases", "pred*"]
-    options = paper_rom._parser().parse_args(arguments)
+    options = SimpleNamespace(scale="half", cases=["pred*"], modes=None, predict=None)
     kinds = paper_rom._kinds(source_paper.EXPERIMENTS["taylor-green"], options)
     every = source_paper.EXPERIMENTS["taylor-green"].wanted(kinds)
     assert {c.reynolds for c in paper_rom._wanted(every, options)} == {175.0}

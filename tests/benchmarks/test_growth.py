@@ -1,6 +1,7 @@
 """Cost of growth: slopes of known curves, and every family at a tiny size."""
 
 import json
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -150,8 +151,9 @@ def test_finished_cases_are_not_run_again(tmp_path, capsys, monkeypatch):
 
 
 def test_all_cases():
-    options = growth._parser().parse_args([])
-    every = growth.cases(options)
+    every = growth.cases(
+        SimpleNamespace(particles=None, families=tuple(growth.ALONG), kind="full")
+    )
     assert {case.particles for case in every if case.family == FULL} == {
         1024, 3025, 10_000, 29_929, 99_856, 300_304, 1_000_000
     }  # fmt: skip

@@ -154,10 +154,10 @@ def ghosts_by(effects, position, walls, periodic=CHANNEL, blind=False, **fields)
         "wall_velocity": walls.velocity,
     }
     pairs = wall_list(space, position, walls).wall
-    terms = tuple(t for e in effects for t in e.ghost_terms(space))
-    sums = ghost_sums(terms, state, ghosts, space, pairs)
     forces = tuple(e for e in effects if isinstance(e, BodyForce))
     context = Context(jnp.asarray(0.0), FLUID, jnp.asarray(RHO0 * DX**2), space, forces=forces)
+    terms = tuple(t for e in effects for t in e.ghost_terms(context))
+    sums = ghost_sums(terms, state, ghosts, space, pairs)
     for effect in effects:
         ghosts = ghosts | effect.ghost_fields(context, ghosts, sums)
     # at the rim of the support weights are as good as zero: these ghosts are of neither kind

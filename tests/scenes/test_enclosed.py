@@ -27,7 +27,7 @@ from jaxsph.scenes import (
 from jaxsph.scenes.record import scene_from_record
 
 ENCLOSED = (couette, hydrostatic_tank, lid_driven_cavity, open_cavity, poiseuille)
-WALL_METHODS = ("ghost_terms", "ghost_fields", "wall_geometry_terms", "wall_rate_terms")
+WALL_METHODS = ("ghost_terms", "ghost_fields")
 
 # ------------------------------------------------------------------ what is compiled
 

@@ -98,8 +98,8 @@ def test_pair_repulsion_has_a_potential_and_spares_even_particles():
 def test_pairs_that_meet_gain_no_energy_on_the_average(step):
     """Head on, by RK4 steps of up to the sound's limit in h / c0, at many phases of a step."""
     space = Space(Box((0.0, 0.0), (1.0, 1.0), (True, True)), WendlandC2(), 2.0, 1.0)
-    term, fluid = PairRepulsion().rate_terms(space)[0], Fluid(1.0, 10.0, 1.0)
-    context = Context(jnp.zeros(()), fluid, jnp.asarray(1.0), space)
+    context = Context(jnp.zeros(()), Fluid(1.0, 10.0, 1.0), jnp.asarray(1.0), space)
+    term = PairRepulsion().rate_terms(context)[0]
     still = jnp.zeros(1000)
 
     def slope(_, place):

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks.hard_cases import measures
+from benchmarks.hard_cases.bounds import DENSITY, DISTANCE, LOOSE_DENSITY, WALLS
+from benchmarks.hard_cases.judge import Case, Ending, Outcome, Run, all_finite, complaints, run_case
 from jaxsph import Trajectory
 from jaxsph.arrangements import Lattice
 from jaxsph.integrate import FaultCode
 from jaxsph.scenes import lid_driven_cavity, taylor_green
-from tests.stability import measures
-from tests.stability.bounds import DENSITY, DISTANCE, LOOSE_DENSITY, WALLS
-from tests.stability.judge import Case, Ending, Outcome, Run, all_finite, complaints, run_case
 
 
 @pytest.fixture(scope="module")

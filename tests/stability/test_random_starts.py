@@ -6,9 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tests.stability.bounds import SCATTERED
-from tests.stability.judge import Case, Ending, complaints, run_case
-from tests.stability.spoilt_cases import RANDOM_PARTICLES, random_start
+from benchmarks.hard_cases.bounds import SCATTERED
+from benchmarks.hard_cases.judge import Case, Ending, complaints, run_case
+from benchmarks.hard_cases.spoilt_cases import RANDOM_PARTICLES, random_start
 
 SIDE = round(RANDOM_PARTICLES**0.5)
 LATTICE = (np.stack(np.meshgrid(*(np.arange(SIDE),) * 2), -1).reshape(-1, 2) + 0.5) / SIDE

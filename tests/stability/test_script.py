@@ -2,11 +2,12 @@
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from benchmarks import stability
-from tests.stability.cases import CASES
+from benchmarks.hard_cases.cases import CASES
 
 CHOSEN = "step/2-h-over-c0-scene"
 
@@ -40,10 +41,10 @@ def test_results_and_page(tmp_path, capsys, monkeypatch):
 
 
 def test_long_cases_are_asked_for():
-    options = stability._parser().parse_args([])
-    quick = stability._chosen(options)
+    quick, every = (
+        stability._chosen(SimpleNamespace(cases=None, slow=slow)) for slow in (False, True)
+    )
     assert quick and not any(case.slow for case in quick)
-    every = stability._chosen(stability._parser().parse_args(["--slow"]))
     assert every == list(CASES.values())
 
 

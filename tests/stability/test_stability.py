@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests.stability.cases import CASES
-from tests.stability.judge import complaints, run_case
+from benchmarks.hard_cases.cases import CASES
+from benchmarks.hard_cases.judge import complaints, run_case
 
 
 def _marked(case):

@@ -121,17 +121,17 @@ class EulerianRates(eqx.Module):
             raise ValueError("samples: give at least one point, and each once.")
         if samples.min() < 0 or samples.max() >= count:
             raise ValueError(f"samples: numbers from 0 to {count - 1}, got {samples.max()}.")
-        functional, effects = self.functional, self.functional.effects
-        coefficients = self.coefficients
+        functional, coefficients = self.functional, self.coefficients
         space, walls = functional.space, functional.walls
         reach = space.support * (1.0 + 1e-9)
         points = Cloud(np.asarray(self.points), space.box)
         near = points.around(points.positions[samples], reach)
-        first_pass = any(e.geometry_terms(space) for e in effects)
+        context = functional.context(jnp.zeros(()))
+        first_pass = [term for e in functional.effects for term in e.geometry_terms(context)]
         members = points.around(points.positions[near], reach) if first_pass else near
         if walls is not None:
             ghosts = Cloud(np.asarray(walls.position), space.box)
-            at_walls = any(e.wall_geometry_terms(space) for e in effects)
+            at_walls = any(term.ghost is not None for term in first_pass)
             seeing = near if at_walls else samples
             seen = ghosts.around(points.positions[seeing], reach)
             members = np.union1d(members, points.around(ghosts.positions[seen], reach))

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
-from jaxsph import PairTerm, ParticleState, SPHFunctional, VerletList, WallList
-from jaxsph.effects import Effect, WallTerm
+from jaxsph import PairTerm, ParticleState, Same, SPHFunctional, VerletList, WallList
+from jaxsph.effects import Effect
 from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
 
@@ -32,17 +32,10 @@ def carried_velocity(pair, i, j):
 class CarriedGradients(Effect):
     """Gradients of the fields that the flow carries, at walls with the ghosts' values."""
 
-    def rate_terms(self, space):
+    def rate_terms(self, context):
         return (
-            PairTerm("carried_density", ("density",), carried_density),
-            PairTerm("carried_velocity", ("velocity",), carried_velocity),
-        )
-
-    def wall_rate_terms(self, space):
-        density, velocity = ("density",), ("velocity",)
-        return (
-            WallTerm("carried_density", density, density, carried_density),
-            WallTerm("carried_velocity", velocity, velocity, carried_velocity),
+            PairTerm("carried_density", ("density",), carried_density, Same()),
+            PairTerm("carried_velocity", ("velocity",), carried_velocity, Same()),
         )
 
 

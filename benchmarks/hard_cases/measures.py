@@ -11,12 +11,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from benchmarks.measure import near_walls
 from jaxsph import Trajectory
 from jaxsph.metrics import kinetic_energy
 from jaxsph.pairs import Space
 from jaxsph.scenes import Scene
 from jaxsph.scenes.hydrostatic_tank import GRAVITY, hydrostatic_pressure
+
+from ..measure import near_walls
 
 _LOOKED_AT = 21  # snapshots, evenly spread over a run, that disorder is measured in
 
