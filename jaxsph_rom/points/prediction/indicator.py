@@ -11,7 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ...basis import Basis
+from ..dynamics.base import Dynamics
 from ..dynamics.eulerian_rates import EulerianRates
+from .recovery import Recovery
 from .reduced_flow import ReducedFlow
 
 _POINTS = 64  # at which the residual is taken
@@ -71,7 +74,8 @@ class Indicator(eqx.Module):
 
     def residual(
         self,
-        flow: ReducedFlow,
+        system: Dynamics,
+        shown: Basis | Recovery,
         values: Float[Array, " coefficients"],
         time: Float[Array, " times"],
         coordinates: Float[Array, "times modes"],
@@ -83,11 +87,11 @@ class Indicator(eqx.Module):
         def squared(moment):
             t, a = moment
 
-            def shown(a):
-                matrix, rest = flow.shown.combination(a)
+            def made(a):
+                matrix, rest = shown.combination(a)
                 return self.functions @ matrix + rest
 
-            fields, change = jax.jvp(shown, (a,), (flow.system.rates(t, a, values),))
+            fields, change = jax.jvp(made, (a,), (system.rates(t, a, values),))
             wanted = self.rates(t, fields, values)
             away = (change - wanted)[: self.count, 1:]
             return jnp.mean(jnp.sum(away**2, axis=1))
@@ -95,9 +99,29 @@ class Indicator(eqx.Module):
         moments = jnp.asarray(time, coordinates.dtype)[places], coordinates[places]
         return jnp.sqrt(jnp.mean(jax.lax.map(squared, moments)))
 
-    def __call__(self, flow, values, time, coordinates) -> Float[Array, ""]:
+    def __call__(self, system, shown, values, time, coordinates) -> Float[Array, ""]:
         """The expected error of velocity, relative to the largest velocity in its norm."""
-        return self.scale * self.residual(flow, values, time, coordinates)
+        return self.scale * self.residual(system, shown, values, time, coordinates)
+
+
+def indicated(
+    indicator: Indicator,
+    flow: ReducedFlow,
+    values: Float[Array, "members coefficients"],
+    time: Float[Array, " times"],
+    coordinates: Float[Array, "members times modes"],
+) -> Float[Array, " members"]:
+    """The expected error of each member."""
+    return _indicated(indicator, flow.system, flow.shown, values, time, coordinates)
+
+
+@eqx.filter_jit
+def _indicated(indicator, system, shown, values, time, coordinates):
+    def one(member):
+        values, coordinates = member
+        return indicator(system, shown, values, time, coordinates)
+
+    return jax.lax.map(one, (values, coordinates))
 
 
 def velocity_error(
