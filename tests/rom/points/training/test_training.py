@@ -221,7 +221,7 @@ def test_what_no_tensors_can_follow_is_refused_before_a_run(change, match, monke
     def no_run(*_, **__):
         raise AssertionError("a full run was made")
 
-    monkeypatch.setattr("jaxsph_rom.points.training.train.run_scene", no_run)
+    monkeypatch.setattr("jaxsph_rom.points.training.training.run_scene", no_run)
     points = [{"v": 0.01, "f": 0.5}, {"v": 0.02, "f": 1.0}]
     with pytest.raises(ValueError, match=match):
         jaxsph_rom.train(change, points, modes=2)
