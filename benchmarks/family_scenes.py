@@ -72,7 +72,9 @@ def vortex(reynolds: float, amplitude: float, *, resolution: int, end_time: floa
 
 def channel(reynolds: float, *, resolution: int, end_time: float) -> Scene:
     """Poiseuille flow from rest, whose force is 8 / Re."""
-    return poiseuille(resolution, reynolds, time_step=0.1 / resolution, end_time=end_time)
+    return poiseuille(
+        resolution, reynolds, h_over_dx=1.5, time_step=0.1 / resolution, end_time=end_time
+    )
 
 
 def with_viscosity(effect: Effect, viscosity: float) -> Effect:
@@ -85,6 +87,7 @@ def with_viscosity(effect: Effect, viscosity: float) -> Effect:
 class Case(NamedTuple):
     """A family, its training points, how many modes its model has, and its closure."""
 
+    told: str
     make: Callable[..., Scene]
     points: list[dict[str, float]]
     modes: int
@@ -99,8 +102,20 @@ def _corners(**ranges: tuple[float, float]) -> list[dict[str, float]]:
 
 
 CASES = {
-    "vessel": Case(vessel, _corners(viscosity=(0.01, 0.03), force=(0.5, 1.5)), 10, LinearClosure()),
-    "cavity": Case(cavity, _corners(reynolds=(50.0, 150.0), lid=(0.5, 1.0)), 10, LinearClosure()),
-    "vortex": Case(vortex, _corners(reynolds=(50.0, 150.0), amplitude=(0.5, 1.0)), 6),
-    "channel": Case(channel, [{"reynolds": re} for re in (20.0, 40.0, 80.0)], 6, LinearClosure()),
-}
+    "vessel": Case(
+        "water stirred from rest in a square vessel, over viscosity and force",
+        vessel, _corners(viscosity=(0.01, 0.03), force=(0.5, 1.5)), 10, LinearClosure(),
+    ),
+    "cavity": Case(
+        "the lid-driven cavity from rest, over Reynolds number and lid speed",
+        cavity, _corners(reynolds=(50.0, 150.0), lid=(0.5, 1.0)), 10, LinearClosure(),
+    ),
+    "vortex": Case(
+        "the Taylor-Green vortex, over Reynolds number and amplitude of the start",
+        vortex, _corners(reynolds=(50.0, 150.0), amplitude=(0.5, 1.0)), 6,
+    ),
+    "channel": Case(
+        "Poiseuille flow from rest, over the Reynolds number; its force is 8 / Re",
+        channel, [{"reynolds": re} for re in (20.0, 40.0, 80.0)], 6, LinearClosure(),
+    ),
+}  # fmt: skip

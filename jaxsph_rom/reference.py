@@ -51,6 +51,7 @@ class ReferenceSpace(eqx.Module):
         self.space = space
         self.map = rule.allocate(self.points, space)
 
+    @eqx.filter_jit  # compiled once for runs and starts
     def compose(self, position: Array, fields: Array) -> tuple[Array, Array]:
         """G: particle fields (N, F) at the reference points (G, F), and the overflow flag."""
         return self.map(position, fields)
@@ -67,8 +68,8 @@ class ReferenceSpace(eqx.Module):
         )
         for k in range(len(trajectory.time)):
             density, velocity = trajectory.density[k][:, None], trajectory.velocity[k]
-            fields, overflow = _compose(
-                self, trajectory.position[k], np.concatenate([density, velocity], axis=1)
+            fields, overflow = self.compose(
+                trajectory.position[k], np.concatenate([density, velocity], axis=1)
             )
             if bool(overflow):
                 raise ValueError(
@@ -77,8 +78,3 @@ class ReferenceSpace(eqx.Module):
                 )
             out[:, :, k] = np.asarray(fields)
         return out
-
-
-@eqx.filter_jit
-def _compose(space: ReferenceSpace, position, fields):
-    return space.compose(position, fields)

@@ -16,6 +16,7 @@ from jaxsph.effects import DensityDiffusion, ParticleShifting, ShiftingTransport
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.metrics import probe
 from jaxsph.scenes import SCENES, Scene
+from jaxsph.schemes import SCHEMES
 from jaxsph_rom.study import quiet
 
 from ..references.lid_driven_cavity import CavityFlow, regularised_lid, solve
@@ -36,6 +37,7 @@ def make_scene(name: str, case: Case, setting: FullSetting, reynolds: float) -> 
         "kernel": getattr(kernels, setting.kernel)(),
         "mach": setting.mach,
         "dtype": setting.precision,
+        "scheme": SCHEMES[setting.scheme],
     }
     cheap = SCENES[name](arrangement=Lattice(), time_step=case.end_time / _MANY, **given)
     interval = setting.step * cheap.stable_time_step * cheap.steps_per_snapshot
@@ -43,8 +45,9 @@ def make_scene(name: str, case: Case, setting: FullSetting, reynolds: float) -> 
     scene = SCENES[name](
         arrangement=STARTS[setting.start](), time_step=case.end_time / steps, **given
     )
-    effects = tuple(_effects(scene, setting))  # numerical ones differ, the flow does not
-    scene = dataclasses.replace(scene, effects=effects, solution=scene.exact)
+    if setting.scheme == "delta-plus":
+        effects = tuple(_effects(scene, setting))  # numerical ones differ, the flow does not
+        scene = dataclasses.replace(scene, effects=effects, solution=scene.exact)
     return quiet(scene) if setting.start == "quiet" else scene
 
 
@@ -62,7 +65,8 @@ def errors(case: Case, scene: Scene, trajectory: Trajectory) -> dict[str, float]
 
         100 || u - u_ref || / || u_ref ||,    100 || p - p_ref || / || p_ref ||,
 
-    both pressures less their mean over the particles. Times are those from `judged_from` on, the
+    both pressures less their mean over the particles; where the exact field is zero throughout,
+    relative to the speed U of the fluid and to rho0 U^2. Times are those from `judged_from` on, the
     start apart; the reference is taken where the particles are. Where it is steady, the pressure is
     the mean over these times instead, without sound: particles are mapped to where they started.
     """
@@ -76,14 +80,20 @@ def errors(case: Case, scene: Scene, trajectory: Trajectory) -> dict[str, float]
     def wanted(position, time):
         return [np.asarray(field) for field in exact(np.asarray(position, float), float(time))]
 
+    speed = float(scene.fluid.reference_speed)
+    scales = math.sqrt(run.particles) * np.array([speed, density * speed**2])
     truths = [wanted(*at) for at in zip(run.position, run.time, strict=True)]
     found = {
-        "velocity": [_relative(a, b) for a, (b, _) in zip(run.velocity, truths, strict=True)],
-        "pressure": [_fluctuation(a, b) for a, (_, b) in zip(run.pressure, truths, strict=True)],
+        "velocity": [
+            _relative(a, b, scales[0]) for a, (b, _) in zip(run.velocity, truths, strict=True)
+        ],
+        "pressure": [
+            _fluctuation(a, b, scales[1]) for a, (_, b) in zip(run.pressure, truths, strict=True)
+        ],
     }
     if case.steady:
         points, pressure = _mean_pressure(scene, run)
-        found["pressure"] = [_fluctuation(pressure, wanted(points, run.time[-1])[1])]
+        found["pressure"] = [_fluctuation(pressure, wanted(points, run.time[-1])[1], scales[1])]
     return {
         f"{field}_{name}_percent": float(rule(values))
         for field, values in found.items()
@@ -110,13 +120,13 @@ def _cavity(reynolds: float) -> CavityFlow:
     return solve(reynolds, regularised_lid)
 
 
-def _relative(found: np.ndarray, true: np.ndarray) -> float:
-    found = np.asarray(found, float)
-    return 100.0 * float(np.linalg.norm(found - true) / np.linalg.norm(true))
+def _relative(found: np.ndarray, true: np.ndarray, scale: float) -> float:
+    apart = np.linalg.norm(np.asarray(found, float) - true)
+    return 100.0 * float(apart / (np.linalg.norm(true) or scale))
 
 
-def _fluctuation(found: np.ndarray, true: np.ndarray) -> float:
-    return _relative(np.asarray(found, float) - found.mean(), true - true.mean())
+def _fluctuation(found: np.ndarray, true: np.ndarray, scale: float) -> float:
+    return _relative(np.asarray(found, float) - found.mean(), true - true.mean(), scale)
 
 
 def command(name: str, case: Case, setting: Setting, time_step: float) -> str:
@@ -124,17 +134,17 @@ def command(name: str, case: Case, setting: Setting, time_step: float) -> str:
     if isinstance(setting, ReducedSetting):
         return _reduced_command(name, case, setting, time_step)
     own = FullSetting(setting.resolution, setting.h_over_dx, setting.step, start=setting.start)
-    plain = dataclasses.replace(own, precision=setting.precision)
+    plain = dataclasses.replace(own, precision=setting.precision, scheme=setting.scheme)
     if setting == plain and setting.start == ("packed" if name == "taylor-green" else "rest"):
         sizes = _sizes(setting, case, time_step)
-        return f"jaxsph run {name} --reynolds {case.reynolds:g} {sizes} --precision " + (
-            setting.precision
-        )
+        given = f"--precision {setting.precision} --scheme {setting.scheme}"
+        return f"jaxsph run {name} --reynolds {case.reynolds:g} {sizes} {given}"
     call = (
         f"{name.replace('-', '_')}({setting.resolution}, {case.reynolds!r}, "
         f"h_over_dx={setting.h_over_dx!r}, time_step={time_step!r}, end_time={case.end_time!r}, "
         f"mach={setting.mach!r}, kernel=jaxsph.kernels.{setting.kernel}(), "
         f"arrangement=jaxsph.arrangements.{STARTS[setting.start].__name__}(), "
+        f"scheme=jaxsph.schemes.{type(SCHEMES[setting.scheme]).__name__}(), "
         f"dtype={setting.precision!r})"
     )
     left_out = [] if setting.shifting else ["ParticleShifting", "ShiftingTransport"]

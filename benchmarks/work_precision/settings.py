@@ -41,6 +41,7 @@ class FullSetting:
         step: dt over its stability limit.
         delta: of the density diffusion; 0 leaves it out.
         start: `quiet` (stirred particles at a balanced pressure) or `packed`; `rest` in a cavity.
+        scheme: by its name; `delta` and `shifting` are those of `delta-plus`.
     """
 
     resolution: int = 64
@@ -52,6 +53,7 @@ class FullSetting:
     shifting: bool = True
     mach: float = 0.1
     start: str = "quiet"
+    scheme: str = "delta-plus"
 
     @property
     def family(self) -> str:
@@ -163,6 +165,7 @@ _CAVITY = Case(
 
 def _vortex() -> Grid:
     base, moving = FullSetting(), ReducedSetting(3)
+    better = FullSetting(scheme="consistent")
     tensor, sampled = ReducedSetting(5, "tensor"), ReducedSetting(5, "q-deim", samples=20)
     closed = ReducedSetting(5, "tensor", closure="linear")
     return Grid(
@@ -177,6 +180,9 @@ def _vortex() -> Grid:
                    precision=("float32",), delta=(0.0, 0.05, 0.2), shifting=(False,),
                    mach=(0.05, 0.2), start=("packed",)),
             crossed(base, resolution=(128,), precision=("float32",)),
+            crossed(better, resolution=(16, 24, 32, 48, 64, 96)),
+            varied(better, h_over_dx=(1.5, 3.0, 4.0), kernel=("WendlandC4", "QuinticSpline"),
+                   precision=("float32",), mach=(0.05,), step=(0.5,), start=("packed",)),
             varied(tensor, modes=(2, 3, 10, 20), product=("euclidean",),
                    formulation=("solenoidal",), resolution=(32, 96), closure=("linear",)),
             varied(closed, modes=(10,)),
@@ -190,6 +196,7 @@ def _vortex() -> Grid:
 
 def _cavity() -> Grid:
     base = FullSetting(32, start="rest")
+    better = dataclasses.replace(base, scheme="consistent")
     moving = ReducedSetting(5, resolution=32, start="rest")
     tensor = dataclasses.replace(moving, modes=10, hyper="tensor", formulation="solenoidal")
     sound = dataclasses.replace(tensor, formulation="compressible")
@@ -202,6 +209,9 @@ def _cavity() -> Grid:
             crossed(base, resolution=(24, 32), h_over_dx=(1.5, 3.0)),
             varied(base, kernel=("WendlandC4", "QuinticSpline"), precision=("float32",),
                    delta=(0.0, 0.2), shifting=(False,), mach=(0.2,)),
+            crossed(better, resolution=(16, 24, 32, 40, 50)),
+            varied(better, h_over_dx=(1.5, 3.0), kernel=("WendlandC4", "QuinticSpline"),
+                   precision=("float32",)),
             varied(tensor, modes=(5, 15), resolution=(50,)),
             varied(sound, modes=(5,), product=("euclidean",), closure=("linear",)),
             varied(sampled, hyper=("non-negative",)),
@@ -210,6 +220,22 @@ def _cavity() -> Grid:
             crossed(moving, projection=("apg",), tau=(1e-4, "convective")),
         ),
     )  # fmt: skip
+
+
+def _exact(reynolds: float, end_time: float) -> Grid:
+    """A flow between walls whose solution is known, from a lattice, full models only."""
+    base = FullSetting(25, start="rest")
+    settings = [
+        setting
+        for scheme in ("delta-plus", "consistent")
+        for own in [dataclasses.replace(base, scheme=scheme)]
+        for setting in (
+            *crossed(own, resolution=(12, 25, 50)),
+            *varied(own, h_over_dx=(1.5, 3.0), precision=("float32",)),
+        )
+    ]
+    case = Case(reynolds, (), end_time, 0.1 * end_time, "the exact solution")
+    return Grid(case, _distinct(settings))
 
 
 def _quick_vortex() -> Grid:
@@ -237,5 +263,11 @@ def _quick_cavity() -> Grid:
     return Grid(case, _distinct(*settings))
 
 
-GRIDS = {"taylor-green": _vortex(), "lid-driven-cavity": _cavity()}
+GRIDS = {
+    "taylor-green": _vortex(),
+    "lid-driven-cavity": _cavity(),
+    "poiseuille": _exact(10.0, 2.0),
+    "couette": _exact(10.0, 2.0),
+    "hydrostatic-tank": _exact(100.0, 10.0),
+}
 QUICK = {"taylor-green": _quick_vortex(), "lid-driven-cavity": _quick_cavity()}

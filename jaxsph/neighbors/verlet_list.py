@@ -91,13 +91,7 @@ class NeighborSearch(eqx.Module):
         if position.shape[0] == 0:
             raise ValueError("position: got no particles; give at least one.")
         radius = support + skin
-        for length, periodic in zip(box.lengths, box.periodic, strict=True):
-            if periodic and length < 2.0 * radius:
-                raise ValueError(
-                    f"box: a periodic length of {length:g} m is too small for a kernel support of "
-                    f"{support:g} m (with skin {radius:g} m); it needs at least {2 * radius:g} m. "
-                    "Raise the resolution or lower h/dx."
-                )
+        check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
         cell_capacity = int(1.3 * grid.occupancy(position)) + 2
         trial = cls(grid, support, skin, 1, cell_capacity)
@@ -161,6 +155,18 @@ class NeighborSearch(eqx.Module):
         words = chunked_map(flag, (bins.members[:-1], candidates), chunk)
         words = words[bins.cell, bins.slot]
         return bins, words, jnp.max(count_bits(words))
+
+
+def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
+    """A ValueError if a particle could meet another across two faces of a periodic box."""
+    radius = support + skin
+    for length, periodic in zip(box.lengths, box.periodic, strict=True):
+        if periodic and length < 2.0 * radius:
+            raise ValueError(
+                f"box: a periodic length of {length:g} m is too small for a kernel support of "
+                f"{support:g} m (with skin {radius:g} m); it needs at least {2 * radius:g} m. "
+                "Raise the resolution or lower h/dx."
+            )
 
 
 def candidates(bins: CellBins, grid: CellGrid, nothing: int) -> Int[Array, "cells candidates"]:

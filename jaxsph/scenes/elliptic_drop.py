@@ -107,7 +107,7 @@ def elliptic_drop(
         region=BallRegion((0.0, 0.0), RADIUS),
         velocity=lambda x: STRAIN * x * jnp.asarray([[1.0, -1.0]]),
         pressure=lambda x: middle * (RADIUS**2 - jnp.sum(x * x, axis=1)),
-        arrangement=Rings() if arrangement is None else arrangement,
+        arrangement=Rings(RADIUS) if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
         parameters={"scale": scale, "pull": pull, "alpha": alpha, "scheme": record(scheme)},

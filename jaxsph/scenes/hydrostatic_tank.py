@@ -29,6 +29,11 @@ def hydrostatic_pressure(position):
     return REFERENCE_DENSITY * GRAVITY * (1.0 - position[:, 1])
 
 
+def still_water(position, time):
+    """Velocity (N, 2) [m/s], zero, and pressure (N,) [Pa] at positions (N, 2) [m], at any time."""
+    return jnp.zeros_like(position), hydrostatic_pressure(position)
+
+
 def hydrostatic_tank(
     resolution: int | None = None,
     reynolds: float = 100.0,
@@ -85,5 +90,6 @@ def hydrostatic_tank(
         kernel=kernel,
         scheme=Consistent() if scheme is None else scheme,
         dtype=dtype,
+        solution=still_water,
         parameters={"scale": scale, "reynolds": reynolds},
     )

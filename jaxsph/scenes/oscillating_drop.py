@@ -106,7 +106,7 @@ def oscillating_drop(
         region=BallRegion((0.0, 0.0), RADIUS),
         velocity=lambda x: strain * x * jnp.asarray([[1.0, -1.0]]),
         pressure=lambda x: jnp.full(len(x), TENSION / RADIUS),
-        arrangement=Rings() if arrangement is None else arrangement,
+        arrangement=Rings(RADIUS) if arrangement is None else arrangement,
         kernel=kernel,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds, "amplitude": amplitude},

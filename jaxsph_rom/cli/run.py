@@ -17,7 +17,7 @@ from jaxsph.scenes import Scene
 from ..field_advection import ConsistentAdvection, PaperAdvection
 from ..lattice_polynomials import LatticePolynomials
 from ..points import Family
-from ..points.training.train import check_family
+from ..points.training.training import check_family
 from ..projection import (
     AdjointPetrovGalerkin,
     ConvectiveMemory,

@@ -26,7 +26,7 @@ from ..points import (
     train_each,
 )
 from ..points.training.linear_closure import held_back
-from ..points.training.train import check_family
+from ..points.training.training import check_family
 from ..report.plain import plain
 from ..study import Plan, full_run
 from .options import (

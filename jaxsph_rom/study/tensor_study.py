@@ -11,7 +11,7 @@ from jaxsph.integrate import Fault, SimulationError
 
 from ..points import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
 from ..points.training.linear_closure import held_back
-from ..points.training.train import check_family
+from ..points.training.training import check_family
 from .study import Experiment, ModelBasis, Outcome, Study
 
 

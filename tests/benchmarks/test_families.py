@@ -1,12 +1,15 @@
 """Families of scenes by which reduced models are judged."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import families
 from benchmarks.family_scenes import CASES
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -31,20 +34,25 @@ def test_parameters_reach_the_scenes(name):
 
 def test_errors_and_what_was_expected_of_them():
     rows = [
-        {"error": 0.01 * k, "expected": 0.02 * k, "floor": 0.001, "outside": k == 4}
+        {"error": 0.01 * k, "expected": 0.02 * k, "floor": 0.001, "outside": k == 4,
+         "full_seconds": 2.0}
         for k in (1, 2, 3, 4)
-    ]
-    found = families._summary([*rows, {**rows[0], "error": None, "expected": None}])
+    ]  # fmt: skip
+    lost = {**rows[0], "error": None, "expected": None}
+    found = families._summary([*rows, lost], {"all": 20.0})
     assert found["members"] == 5 and found["lost"] == 1
     assert found["rank_correlation"] == pytest.approx(1.0)
     assert found["expected_over_true"] == pytest.approx([2.0, 2.0, 2.0])
     assert found["median_error_inside"] == pytest.approx(0.02)
+    assert found["median_error_outside"] == pytest.approx(0.04) and found["outside"] == 1
+    assert found["break_even"] == pytest.approx(10.0)
 
 
 def test_a_family_is_judged_and_taken_up_again(tmp_path, capsys):
     path = tmp_path / "families.json"
     same = ["--cases", "vortex", "--resolution", "12", "--end-time", "0.5", "--unseen"]
-    where = ["--out", str(tmp_path), "--json", str(path)]
+    shown = tmp_path / "families.md"
+    where = ["--out", str(tmp_path), "--json", str(path), "--page", str(shown)]
     assert families.main([*same, "1", *where]) == 0
     first = json.loads(path.read_text())["rows"]
     assert families.main([*same, "3", *where]) == 0
@@ -52,3 +60,10 @@ def test_a_family_is_judged_and_taken_up_again(tmp_path, capsys):
     assert rows[0] == first[0] and [row["outside"] for row in rows] == [False, False, True]
     assert all(row["floor"] < row["error"] < 0.2 for row in rows)  # of 12 x 12 particles
     assert "rank correlation" in capsys.readouterr().out
+    assert "| vortex | 3 (1) |" in shown.read_text()
+
+
+def test_the_page_is_that_of_the_results():
+    results = json.loads((ROOT / "benchmarks/results/families.json").read_text())
+    assert (ROOT / "docs/families.md").read_text() == families.page(results)
+    assert {"cavity", "vortex", "channel"} <= set(results["summary"])

@@ -17,6 +17,7 @@ from jaxsph.scenes import (
     balanced,
     couette,
     gresho_vortex,
+    hydrostatic_tank,
     plane_flow_solution,
     poiseuille,
     shear_layer,
@@ -31,11 +32,15 @@ def vortex(**given):
     return taylor_green(12, arrangement=Lattice(), end_time=0.05, **given)
 
 
+def tank(**given):
+    return hydrostatic_tank(12, **given)
+
+
 def eddy(**given):
     return gresho_vortex(16, arrangement=Lattice(), **given)
 
 
-@pytest.mark.parametrize("make", [vortex, eddy])
+@pytest.mark.parametrize("make", [vortex, eddy, tank])
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_start_is_the_exact_one(make, dtype):
     scene = make(dtype=dtype)

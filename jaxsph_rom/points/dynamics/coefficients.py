@@ -118,7 +118,8 @@ class Coefficients(eqx.Module):
         def kept(part):
             if not part.places[0].startswith(".walls"):
                 return part
-            return Coefficient(part.places, part.base[seen], part.directions[:, seen])
+            base, directions = np.asarray(part.base)[seen], np.asarray(part.directions)[:, seen]
+            return Coefficient(part.places, jnp.asarray(base), jnp.asarray(directions))
 
         return Coefficients(tuple(map(kept, self.parts)))
 

@@ -16,8 +16,9 @@ from jaxsph.scenes import Scene
 from ...field_advection import FieldAdvection
 from .cloud import Cloud
 from .coefficients import Coefficients
-from .fixed_points import neighbors_at, on_points, with_effects
+from .fixed_points import on_points, with_effects
 from .log_density import from_log_density
+from .point_lists import neighbors_at
 
 
 class EulerianRates(eqx.Module):
@@ -73,13 +74,13 @@ class EulerianRates(eqx.Module):
     ) -> EulerianRates:
         """Rates by a functional of fixed points (`on_points`), with a list of these or without."""
         functional = with_effects(functional, (*functional.effects, FieldAdvection()))
-        points = jnp.asarray(points, functional.mass.dtype)
         if listed:
             return cls._of(functional, points, coefficients)
-        return cls(functional, points, None, coefficients)
+        return cls(functional, jnp.asarray(points, functional.mass.dtype), None, coefficients)
 
     @classmethod
     def _of(cls, functional: SPHFunctional, points, coefficients) -> EulerianRates:
+        points = jnp.asarray(points, functional.mass.dtype)
         return cls(functional, points, neighbors_at(functional, points), coefficients)
 
     def __call__(
@@ -135,8 +136,9 @@ class EulerianRates(eqx.Module):
             seeing = near if at_walls else samples
             seen = ghosts.around(points.positions[seeing], reach)
             members = np.union1d(members, points.around(ghosts.positions[seen], reach))
-            walls = jax.tree.map(lambda a: a[seen], walls) if len(seen) else None
+            kept = jax.tree.map(lambda a: jnp.asarray(np.asarray(a)[seen]), walls)
+            walls = kept if len(seen) else None
             functional = eqx.tree_at(lambda f: f.walls, functional, walls)
             coefficients = coefficients.at_ghosts(seen)
         members = np.concatenate([samples, np.setdiff1d(members, samples)])
-        return self._of(functional, self.points[members], coefficients), members
+        return self._of(functional, points.positions[members], coefficients), members

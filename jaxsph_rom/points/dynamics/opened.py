@@ -52,15 +52,15 @@ class Opened(eqx.Module):
         scale[0] = ratio**2 * float(fluid.reference_density)
         scale[1:] = float(fluid.reference_speed)
         dtype = operators.points.dtype
-        fields = operators.rest + jnp.asarray(draw * scale, dtype)
-        evaluate = eqx.filter_jit(_acting)
+        direction = jnp.asarray(draw * scale, dtype)
 
         def at(**steps):
             offset = np.zeros(size)
             for name, step in steps.items():
                 offset[int(name[1:])] = step * reach[int(name[1:])]
-            found = evaluate(operators, fields, jnp.asarray(middle + offset, dtype))
-            return [np.asarray(part, float) for part in found]
+            found = operators.along(direction, jnp.asarray(middle + offset, dtype))
+            rates, gradients, *along = (np.asarray(part, float) for part in found)
+            return [rates + along[0], gradients + along[1]]
 
         zero = at()
         moved = [(at(**{f"k{k}": 1.0}), at(**{f"k{k}": -1.0})) for k in range(size)]
@@ -89,8 +89,3 @@ class Opened(eqx.Module):
                 if np.abs(mixed).max() > allowed[k] + allowed[i] and power not in powers:
                     powers.append(power)
         return cls(jnp.asarray(middle, dtype), tuple(powers))
-
-
-def _acting(operators: ReferenceOperators, fields, values):
-    """Rates without advection, and the gradients that advection takes."""
-    return operators.affine(fields, values), operators.at(values).gradients(fields)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import reduce
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
@@ -17,7 +16,7 @@ from jaxsph.scenes import Scene
 from ...basis import Basis
 from .base import Dynamics
 from .opened import Opened
-from .reference_operators import ReferenceOperators, mapped
+from .reference_operators import ReferenceOperators
 
 
 class QuadraticSystem(Dynamics):
@@ -157,22 +156,24 @@ def projected(
         middle = operators.coefficients.values(operators.functional)
         opened = Opened(middle, tuple(_units(len(middle))))
     dtype = operators.points.dtype
-    modes = jnp.asarray(basis.modes, dtype)
-    centre = jnp.broadcast_to(jnp.asarray(basis.centre, dtype), modes.shape[:2])
+    modes, rest = np.asarray(basis.modes), np.asarray(operators.rest)
+    centre = np.broadcast_to(np.asarray(basis.centre), modes.shape[:2])
     weights = jnp.asarray(basis.weights, dtype)
-    middle = jnp.asarray(opened.middle, dtype)
-    functions = jnp.concatenate([(centre - operators.rest)[:, :, None], modes], axis=2)
+    middle = np.asarray(opened.middle, float)
+    functions = np.concatenate([(centre - rest)[:, :, None], modes], axis=2).astype(dtype)
     units = np.eye(len(middle))
     # steps that do not vanish beside the rest: what is a polynomial has no other error than that
     steps = [max(1.0, abs(float(m))) for m in middle]
 
     def at(*moved: tuple[int, float]):
-        values = np.asarray(middle, float)
+        values = middle
         for k, share in moved:
             values = values + share * steps[k] * units[k]
-        return _assembled(
-            operators, functions, centre, weights, form, jnp.asarray(values, dtype)
-        )
+        values = jnp.asarray(values, dtype)
+        found = [operators.along(functions[:, :, k], values) for k in range(functions.shape[2])]
+        along = (np.stack(part, axis=-1) for part in zip(*(f[2:] for f in found), strict=True))
+        tested = _tested(functions, weights, form, *found[0][:2], *along)
+        return [np.asarray(part, float) for part in tested]
 
     *whole, quadratic = at()
     ahead = [at((k, 1.0))[:2] for k in range(len(middle))]
@@ -193,7 +194,8 @@ def projected(
                 slopes[k] = slopes[k] - 0.5 * steps[k] * bend[n]
         second = {powers: bend[n] for powers, bend in bends.items()}
         parts.append(_about_zero(whole[n], slopes, second, middle, opened.powers))
-    return QuadraticSystem(*parts, quadratic, opened.powers)
+    tensors = (jnp.asarray(part, dtype) for part in (*parts, quadratic))
+    return QuadraticSystem(*tensors, opened.powers)
 
 
 def _pair(powers: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -215,35 +217,26 @@ def _about_zero(value, slopes, bends, middle, powers):
         parts[one] = parts[one] - share * bend * middle[i]
         parts[other] = parts[other] - share * bend * middle[k]
         parts[power] = share * bend
-    return jnp.stack([first, *(parts[power] for power in powers)])
+    return np.stack([first, *(parts[power] for power in powers)])
 
 
 @eqx.filter_jit
-def _assembled(operators, functions, centre, weights, form, values):
-    """Constant, linear and quadratic part at theta."""
-    at = operators.at(values)
-    rest, modes = operators.rest, functions[:, :, 1:]
+def _tested(functions, weights, form, rates, gradients, rates_along, gradients_along):
+    """Constant, linear and quadratic part, of what acts at rest and along each function."""
     weighted = functions * weights[None, :, None]
 
     def tested(fields):
         return jnp.einsum("gfk,gf...->k...", weighted, fields)
 
-    def slopes(function, stack, *arguments):
-        def along(mode):
-            return jax.jvp(lambda f: function(f, *arguments), (centre,), (mode,))[1]
-
-        return mapped(along, stack)
-
-    plain = tested(at.affine(centre, values))[1:]
-    plain_slopes = tested(slopes(at.affine, modes, values))[1:]
     velocity = jnp.moveaxis(functions[:, 1:], 2, 0)
-    gradient = slopes(at.gradients, functions)
 
     def carried(gradient):  # tested, by each velocity in turn
         return lax.map(lambda one: -tested(jnp.einsum("gd,gfd...->gf...", one, gradient)), velocity)
 
-    by_walls = carried(at.gradients(rest))[:, 1:]  # [i, k]: moving walls' part, by mode i
-    advection = form(carried(gradient))  # [i, k, j]: function j carried by function i
+    plain = tested(rates + rates_along[:, :, 0])[1:]
+    plain_slopes = tested(rates_along[:, :, 1:])[1:]
+    by_walls = carried(gradients)[:, 1:]  # [i, k]: moving walls' part, by mode i
+    advection = form(carried(gradients_along))  # [i, k, j]: function j carried by function i
     by_centre, of_centre, by_modes = advection[0, 1:], advection[1:, 1:, 0], advection[1:, 1:, 1:]
     constant = plain + by_centre[:, 0] + by_walls[0]
     linear = plain_slopes + by_centre[:, 1:] + (of_centre + by_walls[1:]).T

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import PairTerm, ParticleState, Same, SPHFunctional, VerletList, WallList
@@ -15,7 +16,8 @@ from jaxsph.vector import Vector
 
 from ...field_advection import acts_on_ghosts
 from .coefficients import Coefficients
-from .fixed_points import check_quadratic, neighbors_at, on_points, with_effects
+from .fixed_points import check_quadratic, on_points, with_effects
+from .point_lists import neighbors_at
 
 
 def carried_density(pair, i, j):
@@ -37,6 +39,15 @@ class CarriedGradients(Effect):
             PairTerm("carried_density", ("density",), carried_density, Same()),
             PairTerm("carried_velocity", ("velocity",), carried_velocity, Same()),
         )
+
+
+class Acting(NamedTuple):
+    """Rates without advection and gradients, at rest and their change along a direction."""
+
+    rates: Float[Array, "points fields"]
+    gradients: Float[Array, "points fields dim"]
+    rates_along: Float[Array, "points fields"]
+    gradients_along: Float[Array, "points fields dim"]
 
 
 class ReferenceOperators(eqx.Module):
@@ -104,34 +115,42 @@ class ReferenceOperators(eqx.Module):
         functional = self.coefficients.applied(self.functional, values)
         return ReferenceOperators(functional, self.points, self.neighbors, self.coefficients)
 
-    def affine(
-        self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]
-    ) -> Float[Array, "points fields"]:
-        """Rates of (r, u) at theta without advection, linear but for a force and moving walls."""
-        functional = self.coefficients.applied(self.functional, values)
+    @eqx.filter_jit
+    def along(
+        self, direction: Float[Array, "points fields"], values: Float[Array, " coefficients"]
+    ) -> Acting:
+        """Rates of (r, u) without advection and grad (r, u), at theta: at rest and along a
+        direction. One program serves all who ask, whatever the number of modes."""
+        at = self.at(values)
+        acting = (CarriedGradients(), *filter(acts_on_ghosts, at.functional.effects))
+        carrying = with_effects(at.functional, acting)
+        time = jnp.zeros((), direction.dtype)
 
         def rates(fields):
-            found = functional(jnp.zeros((), fields.dtype), self._state(fields), self.neighbors)
+            found = at.functional(time, self._state(fields), self.neighbors)
             return jnp.concatenate([found.density[:, None], found.velocity], axis=1)
 
-        value, slope = jax.jvp(rates, (self.rest,), (fields - self.rest,))
-        return value + slope
-
-    def gradients(self, fields: Float[Array, "points fields"]) -> Float[Array, "points fields dim"]:
-        """grad (r, u), affine in the fields where walls move."""
-        acting = (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects))
-        functional = with_effects(self.functional, acting)
-
         def gradients(fields):
-            time = jnp.zeros((), fields.dtype)
-            _, _, sums = functional.sums(time, self._state(fields), self.neighbors)
+            _, _, sums = carrying.sums(time, self._state(fields), self.neighbors)
             count, dim = self.points.shape
             velocity = sums["carried_velocity"].reshape(count, dim, dim)
             found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
             return self.neighbors.unsort(found)
 
-        value, slope = jax.jvp(gradients, (self.rest,), (fields - self.rest,))
-        return value + slope
+        value, slope = jax.jvp(lambda f: (rates(f), gradients(f)), (self.rest,), (direction,))
+        return Acting(*value, *slope)
+
+    def affine(
+        self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]
+    ) -> Float[Array, "points fields"]:
+        """Rates of (r, u) at theta without advection, linear but for a force and moving walls."""
+        found = self.along(fields - self.rest, values)
+        return found.rates + found.rates_along
+
+    def gradients(self, fields: Float[Array, "points fields"]) -> Float[Array, "points fields dim"]:
+        """grad (r, u), affine in the fields where walls move."""
+        found = self.along(fields - self.rest, self.coefficients.values(self.functional))
+        return found.gradients + found.gradients_along
 
     @property
     def rest(self) -> Float[Array, "points fields"]:
@@ -146,9 +165,3 @@ class ReferenceOperators(eqx.Module):
 
     def _state(self, fields) -> ParticleState:
         return ParticleState(self.points, fields[:, 1:], fields[:, 0])
-
-
-def mapped(function, stack: Float[Array, "points fields modes"], *arguments):
-    """`function` of each mode of a stack, one after another; modes stay last."""
-    found = lax.map(lambda fields: function(fields, *arguments), jnp.moveaxis(stack, -1, 0))
-    return jnp.moveaxis(found, 0, -1)

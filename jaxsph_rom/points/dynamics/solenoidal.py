@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from jaxsph import Fluid
 
@@ -25,20 +23,16 @@ def divergence_matrix(operators: ReferenceOperators) -> scipy.sparse.csr_array:
 
     D is (G, G n) for u stacked point by point.
     """
-    points, space = operators.points, operators.space
+    points, space = np.asarray(operators.points), operators.space
+    values = operators.coefficients.values(operators.functional)
+    density = float(operators.functional.fluid.reference_density)
 
     def divergence(velocity):
-        return _divergence(operators, jnp.asarray(velocity, points.dtype))
+        change = np.concatenate([np.zeros_like(velocity[:, :1]), velocity], axis=1)
+        found = operators.along(jnp.asarray(change, points.dtype), values)
+        return -np.asarray(found.rates_along[:, 0]) / density
 
     return local_matrix(divergence, points, points.shape[1], space.box, space.support)
-
-
-@eqx.filter_jit
-def _divergence(operators, velocity: Float[Array, "points dim"]) -> Float[Array, " points"]:
-    change = jnp.concatenate([jnp.zeros_like(velocity[:, :1]), velocity], axis=1)
-    values = operators.coefficients.values(operators.functional)
-    rates = jax.jvp(lambda f: operators.affine(f, values), (operators.rest,), (change,))[1]
-    return -rates[:, 0] / operators.functional.fluid.reference_density
 
 
 def without_divergence(

@@ -11,7 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ...basis import Basis
+from ..dynamics.base import Dynamics
 from ..dynamics.eulerian_rates import EulerianRates
+from .recovery import Recovery
 from .reduced_flow import ReducedFlow
 
 _POINTS = 64  # at which the residual is taken
@@ -43,11 +46,12 @@ class Places(NamedTuple):
 class Indicator(eqx.Module):
     """The residual of the fluid's momentum equation in a reduced run, as an error:
 
-        e(theta) = s (mean over times and points of |du/dt - f_u(w, t; theta)|^2)^1/2,
+        e(theta) = s R / U,    R^2 = mean over times and points of |du/dt - f_u(w, t; theta)|^2,
 
     w the run's fields, du/dt their change in the run, f the functional as it stands, taken at some
-    points and times. The scale s [s] makes it a relative error of velocity: what leaving one
-    training run out after the other has shown, in the geometric mean. Of a model with a closure it
+    points and times, U^2 the largest mean over these points of |u|^2 at any of the times. The scale
+    s [s] makes it a relative error of velocity: what leaving one training run out after the other
+    has shown, in the geometric mean. Of a model with a closure it
     is what its own runs show, times by how much leaving one out has raised errors without closure.
 
     Args:
@@ -71,33 +75,58 @@ class Indicator(eqx.Module):
 
     def residual(
         self,
-        flow: ReducedFlow,
+        system: Dynamics,
+        shown: Basis | Recovery,
         values: Float[Array, " coefficients"],
         time: Float[Array, " times"],
         coordinates: Float[Array, "times modes"],
     ) -> Float[Array, ""]:
-        """Of one run [m/s^2]; not finite if the run is lost."""
-        places = np.unique(np.linspace(0, len(time) - 1, 1 + _TIMES).astype(int))[-_TIMES:]
+        """R / U of one run [1/s]; not finite if the run is lost."""
+        places = np.unique(np.linspace(0, len(time) - 1, 1 + _TIMES).astype(int))
         values = jnp.asarray(values, coordinates.dtype)
 
-        def squared(moment):
+        def squares(moment):
             t, a = moment
 
-            def shown(a):
-                matrix, rest = flow.shown.combination(a)
+            def made(a):
+                matrix, rest = shown.combination(a)
                 return self.functions @ matrix + rest
 
-            fields, change = jax.jvp(shown, (a,), (flow.system.rates(t, a, values),))
-            wanted = self.rates(t, fields, values)
-            away = (change - wanted)[: self.count, 1:]
-            return jnp.mean(jnp.sum(away**2, axis=1))
+            fields, change = jax.jvp(made, (a,), (system.rates(t, a, values),))
+            away = change - self.rates(t, fields, values)
+            parts = away[: self.count, 1:], fields[: self.count, 1:]
+            return tuple(jnp.mean(jnp.sum(part**2, axis=1)) for part in parts)
 
         moments = jnp.asarray(time, coordinates.dtype)[places], coordinates[places]
-        return jnp.sqrt(jnp.mean(jax.lax.map(squared, moments)))
+        away, speed = jax.lax.map(squares, moments)
+        largest = jnp.max(speed)
+        # the start is the family's own: what it lacks is no residual of the run
+        residual = jnp.mean(away[-_TIMES:]) / jnp.where(largest > 0.0, largest, 1.0)
+        return jnp.sqrt(residual)
 
-    def __call__(self, flow, values, time, coordinates) -> Float[Array, ""]:
+    def __call__(self, system, shown, values, time, coordinates) -> Float[Array, ""]:
         """The expected error of velocity, relative to the largest velocity in its norm."""
-        return self.scale * self.residual(flow, values, time, coordinates)
+        return self.scale * self.residual(system, shown, values, time, coordinates)
+
+
+def indicated(
+    indicator: Indicator,
+    flow: ReducedFlow,
+    values: Float[Array, "members coefficients"],
+    time: Float[Array, " times"],
+    coordinates: Float[Array, "members times modes"],
+) -> Float[Array, " members"]:
+    """The expected error of each member."""
+    return _indicated(indicator, flow.system, flow.shown, values, time, coordinates)
+
+
+@eqx.filter_jit
+def _indicated(indicator, system, shown, values, time, coordinates):
+    def one(member):
+        values, coordinates = member
+        return indicator(system, shown, values, time, coordinates)
+
+    return jax.lax.map(one, (values, coordinates))
 
 
 def velocity_error(

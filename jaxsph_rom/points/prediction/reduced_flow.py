@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -113,12 +114,8 @@ class ReducedFlow(eqx.Module):
 
     def project(self, fields: Float[Array, "points fields *times"]) -> Float[Array, "*times modes"]:
         """Coordinates of (r, u) on the reference points, as `mapped_run` gives them."""
-        modes, weights = jnp.asarray(self.basis.modes), jnp.asarray(self.basis.weights)
-        centre = jnp.broadcast_to(jnp.asarray(self.basis.centre), modes.shape[:2])
-        weighted = modes * weights[None, :, None]
-        constant = jnp.einsum("gfm,gf->m", weighted, centre)
-        found = jnp.einsum("gfm,gf...->...m", weighted, jnp.asarray(fields))
-        return found - constant.reshape((1,) * (found.ndim - 1) + (-1,))
+        basis = self.basis
+        return projection(basis.modes, basis.centre, basis.weights, jnp.asarray(fields))
 
     @cached_property
     def bound(self) -> EnergyBound:
@@ -175,10 +172,8 @@ class ReducedFlow(eqx.Module):
             points = np.asarray(self.reference.points)
         else:
             functions = self._at(points)
-        matrix, rest = jax.vmap(self.shown.combination)(jnp.asarray(coordinates))
-        fields = functions @ matrix + rest
-        density = from_log_density(fields[..., 0], self.fluid)
-        pressure = (self.fluid if fluid is None else fluid).pressure(density)
+        fluids = self.fluid, self.fluid if fluid is None else fluid
+        fields, density, pressure = _shown(self.shown, functions, jnp.asarray(coordinates), fluids)
         found = (time, fields[..., 1:], density, pressure, coordinates)
         if not any(isinstance(a, jax.core.Tracer) for a in found):
             found = tuple(map(np.asarray, found))
@@ -188,8 +183,11 @@ class ReducedFlow(eqx.Module):
 
     @property
     def shown(self) -> Basis | Recovery:
-        """What fields are made by."""
-        return self.basis if self.recovery is None else self.recovery
+        """What fields are made by; without singular values, whose number is that of the runs and
+        would compile anew what one run is left out of."""
+        if self.recovery is not None:
+            return self.recovery
+        return dataclasses.replace(self.basis, singular_values=np.zeros(0))
 
     @property
     def functions(self) -> Float[np.ndarray, "points functions"]:
@@ -229,3 +227,23 @@ def mapped_run(
     snapshots = reference.snapshots(run)
     log_density = jax.jit(to_log_density)(jnp.asarray(snapshots[:, 0]), fluid)
     return np.concatenate([np.asarray(log_density)[:, None], snapshots[:, 1:]], axis=1)
+
+
+@eqx.filter_jit
+def projection(modes, centre, weights, fields) -> Float[Array, "*times modes"]:
+    """Coordinates of fields (G, F, *times) in a basis, in its product."""
+    centre = jnp.broadcast_to(centre, modes.shape[:2])
+    weighted = modes * weights[None, :, None]
+    constant = jnp.einsum("gfm,gf->m", weighted, centre)
+    found = jnp.einsum("gfm,gf...->...m", weighted, fields)
+    return found - constant.reshape((1,) * (found.ndim - 1) + (-1,))
+
+
+@eqx.filter_jit
+def _shown(shown, functions, coordinates, fluids):
+    """Fields, density and pressure of coordinates."""
+    scale, acting = fluids
+    matrix, rest = jax.vmap(shown.combination)(coordinates)
+    fields = functions @ matrix + rest
+    density = from_log_density(fields[..., 0], scale)
+    return fields, density, acting.pressure(density)

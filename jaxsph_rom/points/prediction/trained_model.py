@@ -20,7 +20,7 @@ from ..dynamics.log_density import to_log_density
 from ..parameters.family import Training, functional_of, table
 from ..parameters.laws import Between, Law
 from ..parameters.through_host import through_host
-from .indicator import Indicator
+from .indicator import Indicator, indicated
 from .prediction import Maker, Prediction
 from .reduced_flow import ReducedFlow
 from .schedule import EvenTimes, GivenTimes, Schedule
@@ -186,7 +186,7 @@ class TrainedModel(eqx.Module):
         """The expected error of each member (`Indicator`)."""
         dtype = self.flow.reference.points.dtype
         arguments = (jnp.asarray(a, dtype) for a in (values, time, coordinates))
-        found = _indicated(self.indicator, self.flow, *arguments)
+        found = indicated(self.indicator, self.flow, *arguments)
         return found if _traced((values, coordinates)) else np.asarray(found)
 
     def predicted_beyond(self, prediction: Prediction) -> dict[str, int]:
@@ -331,29 +331,21 @@ def projected_start(flow: ReducedFlow, start: Scene | ParticleState) -> Float[Ar
     state = start.state if isinstance(start, Scene) else start
     if not isinstance(state, ParticleState):
         raise ValueError(f"start: a scene or its particles, got {type(start).__name__}.")
-    found, overflow = _mapped_start(flow, state)
+    traced = _traced(state)
+    xp, dtype = jnp if traced else np, flow.reference.points.dtype
+    position, velocity, density = (
+        xp.asarray(a, dtype) for a in (state.position, state.velocity, state.density)
+    )
+    particles = xp.concatenate([density[:, None], velocity], axis=1)
+    fields, overflow = flow.reference.compose(position, particles)
     if not _traced(overflow) and bool(overflow):
         raise ValueError("start: particles have clumped and cannot be mapped.")
-    return found
+    return flow.project(_with_log_density(fields, flow.fluid))
 
 
-@eqx.filter_jit
-def _mapped_start(flow: ReducedFlow, state: ParticleState):
-    dtype = flow.reference.points.dtype
-    position, velocity, density = (
-        jnp.asarray(a, dtype) for a in (state.position, state.velocity, state.density)
-    )
-    fields, overflow = flow.reference.compose(
-        position, jnp.concatenate([density[:, None], velocity], axis=1)
-    )
-    log_density = to_log_density(fields[:, :1], flow.fluid)
-    return flow.project(jnp.concatenate([log_density, fields[:, 1:]], axis=1)), overflow
-
-
-@eqx.filter_jit
-def _indicated(indicator, flow, values, time, coordinates):
-    return jax.lax.map(lambda member: indicator(flow, member[0], time, member[1]),
-                       (values, coordinates))  # fmt: skip
+@jax.jit
+def _with_log_density(fields, fluid):
+    return jnp.concatenate([to_log_density(fields[:, :1], fluid), fields[:, 1:]], axis=1)
 
 
 @eqx.filter_jit

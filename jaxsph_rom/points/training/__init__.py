@@ -12,5 +12,5 @@ from .linear_closure import LinearClosure as LinearClosure
 from .reduction import Reduction as Reduction
 from .reduction import Samples as Samples
 from .reduction import Tensors as Tensors
-from .train import train as train
-from .train import train_each as train_each
+from .training import train as train
+from .training import train_each as train_each

@@ -1,6 +1,7 @@
 """A flow of one's own over two parameters: trained, predicted, differentiated, kept in a file."""
 
 import dataclasses
+import re
 
 import equinox as eqx
 import jax
@@ -51,6 +52,14 @@ def test_what_depends_on_the_parameters_is_found(trained):
     assert trained.law is not None and trained.start_law is not None
     assert trained.range == {"viscosity": (0.01, pytest.approx(0.02)), "force": (0.4, 1.0)}
     assert trained.flow.system.powers == ((1, 0), (0, 1))
+
+
+def test_what_is_compiled_serves_all_numbers_of_modes(trained, runs, caplog):
+    with jax.log_compiles():
+        jaxsph_rom.train(make, POINTS, modes=4, runs=runs)
+    compiled = set(re.findall(r"Finished XLA compilation of jit\((\w+)\)", caplog.text))
+    assert "_tested" in compiled  # it takes the modes themselves
+    assert not compiled & {"along", "compose", "_rates_by_effect"}, compiled
 
 
 def test_unseen_parameters_are_those_of_a_full_run(trained):
@@ -212,7 +221,7 @@ def test_what_no_tensors_can_follow_is_refused_before_a_run(change, match, monke
     def no_run(*_, **__):
         raise AssertionError("a full run was made")
 
-    monkeypatch.setattr("jaxsph_rom.points.training.train.run_scene", no_run)
+    monkeypatch.setattr("jaxsph_rom.points.training.training.run_scene", no_run)
     points = [{"v": 0.01, "f": 0.5}, {"v": 0.02, "f": 1.0}]
     with pytest.raises(ValueError, match=match):
         jaxsph_rom.train(change, points, modes=2)

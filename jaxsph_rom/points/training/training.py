@@ -24,7 +24,7 @@ from ...reference import ReferenceSpace
 from ..dynamics.eulerian_rates import EulerianRates
 from ..parameters.family import Family, Training
 from ..parameters.laws import Between, Law
-from ..prediction.indicator import Indicator, Places, scale_of, velocity_error
+from ..prediction.indicator import Indicator, Places, indicated, scale_of, velocity_error
 from ..prediction.reduced_flow import ReducedFlow, mapped_run
 from ..prediction.trained_model import TrainedModel, projected_start
 from .belonging import check_runs
@@ -342,17 +342,11 @@ def _judged(flow: ReducedFlow, project: _Project, k: int, fields) -> dict[str, f
         after = flow.predict(start, values, *project.steps, len(time) - 1)
     except SimulationError:
         return {"error": float("inf"), "residual": float("inf")}
-    coordinates = jnp.concatenate([start[None], after])
-    indicator = Indicator.of(flow, project.places, 1.0)
-    residual = _residual(indicator, flow, values, time, coordinates)
-    return {
-        "error": velocity_error(flow, coordinates, fields[:, 1:]), "residual": float(residual)
-    }  # fmt: skip
-
-
-@eqx.filter_jit
-def _residual(indicator, flow, values, time, coordinates):
-    return indicator.residual(flow, values, time, coordinates)
+    coordinates = np.concatenate([np.asarray(start)[None], after])
+    arguments = (jnp.asarray(a) for a in (values[None], time, coordinates[None]))
+    residual = indicated(Indicator.of(flow, project.places, 1.0), flow, *arguments)
+    error = velocity_error(flow, coordinates, fields[:, 1:])
+    return {"error": error, "residual": float(residual[0])}
 
 
 def _closed(flow, training, scene, projected, closure, progress):
