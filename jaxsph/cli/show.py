@@ -88,7 +88,7 @@ def _measures(path: Path, overview: Overview) -> dict[str, Any]:
 
 def _rows(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
     rows = scene_rows(overview)
-    done = f"{max(0, overview.step)} of {overview.steps} steps"
+    done = f"{max(0, overview.step)} of {overview.schedule.steps} steps"
     rows["progress"] = f"complete, {done}" if overview.complete else (
         f"{done}; still being written, or cut short and to go on with --resume"
     )  # fmt: skip

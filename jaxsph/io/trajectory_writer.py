@@ -79,8 +79,8 @@ class TrajectoryWriter:
 
         Args:
             path: of the file.
-            scene: gives name, parameters, steps, effects, the mass of a particle [kg] (None where
-                they have none), and the particles' number and precision.
+            scene: gives name, parameters, schedule, effects, the mass of a particle [kg] (None
+                where they have none), and the particles' number and precision.
             modes: number of reduced coordinates that snapshots carry, if any.
             metadata: kept with the trajectory, JSON-like.
             made_by: the `content` of what makes the run; that of the scene if none is given.
@@ -107,9 +107,10 @@ class TrajectoryWriter:
             file.attrs["scene"] = scene.name
             file.attrs["parameters"] = _to_json(scene.parameters)
             file.attrs["content"] = json.dumps(dict(made_by))
-            file.attrs["time_step"] = float(scene.time_step)
-            file.attrs["steps"] = int(scene.steps)
-            file.attrs["steps_per_snapshot"] = int(scene.steps_per_snapshot)
+            schedule = scene.schedule
+            file.attrs["time_step"] = float(schedule.time_step)
+            file.attrs["steps"] = int(schedule.steps)
+            file.attrs["steps_per_snapshot"] = int(schedule.steps_per_snapshot)
             file.attrs["complete"] = False
             file.attrs["effects"] = json.dumps([effect.name for effect in scene.effects])
             if scene.mass is not None:
