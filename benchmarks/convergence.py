@@ -101,9 +101,7 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
             trajectory = simulate(
                 scene.model(margin=margin),
                 scene.state,
-                time_step=scene.time_step,
-                steps=scene.steps,
-                steps_per_snapshot=scene.steps_per_snapshot,
+                scene.schedule,
                 progress=mark,
             )
         except SimulationError as error:

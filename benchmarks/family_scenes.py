@@ -13,9 +13,7 @@ from jaxtyping import Array, Float
 from jaxsph import Box, ParticleState
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import BodyForce, Effect
-from jaxsph.scenes import Scene, lid_driven_cavity, poiseuille, taylor_green
-from jaxsph.scenes.enclosed import enclosed_flow
-from jaxsph.scenes.scales import Scale
+from jaxsph.scenes import Scale, Scene, enclosed_flow, lid_driven_cavity, poiseuille, taylor_green
 from jaxsph.schemes import Consistent
 from jaxsph.walls import BoxRegion
 from jaxsph_rom import LinearClosure

@@ -18,8 +18,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from tqdm import tqdm
 
-from jaxsph import COMPILER_OPTIONS, Trajectory
-from jaxsph.pairs import Space
+from jaxsph import COMPILER_OPTIONS, Space, Trajectory
 from jaxsph.scenes import Scene
 from jaxsph_rom.report.plain import plain
 

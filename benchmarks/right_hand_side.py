@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -173,13 +174,8 @@ def _short_run(scene: Scene, steps: int) -> dict[str, Any] | None:
         return None
     steps = _whole_intervals(scene, steps)
     tell(f"running {steps} steps")
-    trajectory = simulate(
-        scene.model(),
-        scene.state,
-        time_step=scene.time_step,
-        steps=steps,
-        steps_per_snapshot=scene.steps_per_snapshot,
-    )
+    schedule = replace(scene.schedule, intervals=steps // scene.steps_per_snapshot)
+    trajectory = simulate(scene.model(), scene.state, schedule)
     seconds = trajectory.metadata["run_seconds"]
     compile_seconds = trajectory.metadata["compile_seconds"]
     return {

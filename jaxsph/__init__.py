@@ -1,9 +1,15 @@
-"""Differentiable smoothed-particle hydrodynamics in JAX."""
+"""Differentiable smoothed-particle hydrodynamics in JAX.
+
+What this package and the packages inside it hand on is public; modules inside these may change.
+"""
 
 from . import arrangements as arrangements
 from . import effects as effects
 from . import integrate as integrate
+from . import interpolation as interpolation
+from . import io as io
 from . import kernels as kernels
+from . import metrics as metrics
 from . import scenes as scenes
 from . import schemes as schemes
 from .at_ghosts import AtGhost as AtGhost
@@ -28,12 +34,14 @@ from .pairs import Space as Space
 from .pairs import pair_sum as pair_sum
 from .particles import ParticleState as ParticleState
 from .run_scene import run_scene as run_scene
+from .schedule import Schedule as Schedule
 from .simulate import simulate as simulate
 from .sweeps import read_member as read_member
 from .sweeps import read_status as read_status
 from .sweeps import sweep as sweep
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
+from .vector import Vector as Vector
 from .version import __version__ as __version__
 from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion

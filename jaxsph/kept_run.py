@@ -31,7 +31,7 @@ def kept_run(
 
     Args:
         path: of the trajectory file.
-        scene: its steps, and its parameters as they are recorded.
+        scene: its schedule, and its parameters as they are recorded.
         model: makes the model, if there is anything left to run.
         start: makes the initial state from the model.
         restore: makes the state from the last snapshot of a trajectory.
@@ -67,9 +67,7 @@ def kept_run(
         part = simulate(
             made,
             state,
-            time_step=scene.time_step,
-            steps=scene.steps,
-            steps_per_snapshot=scene.steps_per_snapshot,
+            scene.schedule,
             first_step=done or 0,
             recorder=writer,
             progress=report,
@@ -96,7 +94,7 @@ def steps_done(path: Path, wanted: Mapping[str, str]) -> int | None:
 def _whole(path: Path, scene: Any) -> Trajectory:
     """The trajectory in a file, which must be all of the scene's run."""
     trajectory = read_trajectory(path)
-    if len(trajectory.time) != scene.steps // scene.steps_per_snapshot + 1:
+    if len(trajectory.time) != scene.schedule.intervals + 1:
         raise _disturbed(path)
     return trajectory
 

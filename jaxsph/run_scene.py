@@ -60,9 +60,7 @@ def run_scene(
         return simulate(
             model,
             scene.state,
-            time_step=scene.time_step,
-            steps=scene.steps,
-            steps_per_snapshot=scene.steps_per_snapshot,
+            scene.schedule,
             progress=report,
             metadata={"scene": scene.name, "parameters": scene.parameters},
             **options,

@@ -23,6 +23,7 @@ from .integrate import (
     Stepping,
     integrate,
 )
+from .schedule import Schedule
 from .trajectory import Snapshot, Trajectory
 
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
@@ -43,10 +44,8 @@ def _interval(model, state, first_step, time_step, steps, stepping):
 def simulate(
     model: Model,
     state: Any,
+    schedule: Schedule,
     *,
-    time_step: float,
-    steps: int,
-    steps_per_snapshot: int,
     first_step: int = 0,
     recorder: Recorder | None = None,
     progress: Callable[[int], None] | None = None,
@@ -62,10 +61,9 @@ def simulate(
     Args:
         model: full or reduced.
         state: at step `first_step`.
-        time_step: dt [s].
-        steps: number of the last step, a whole number of snapshot intervals from the first.
-        steps_per_snapshot: between snapshots.
-        first_step: 0, or where a resumed run goes on; its own snapshot is not recorded again.
+        schedule: of the whole run: step, snapshots, end.
+        first_step: 0, or that of a snapshot where a resumed run goes on; this one is not recorded
+            again.
         recorder: is given each snapshot as it is made.
         progress: is called with the number of steps done since its last call.
         metadata: kept with the trajectory, beside `steps`, `run_seconds`, `compile_seconds`.
@@ -73,23 +71,23 @@ def simulate(
             RK4, or another `Stepper` given to either.
 
     Raises:
-        ValueError: if the steps are not whole snapshot intervals.
+        ValueError: if no whole interval is left to run.
         SimulationError: on a fault; all good snapshots have gone to the recorder by then.
 
     Examples:
         >>> import jaxsph
         >>> from jaxsph.arrangements import Lattice
         >>> scene = jaxsph.scenes.taylor_green(resolution=16, arrangement=Lattice())
-        >>> trajectory = jaxsph.simulate(
-        ...     scene.model(), scene.state, time_step=scene.time_step, steps=4, steps_per_snapshot=2
-        ... )
+        >>> schedule = jaxsph.Schedule(scene.time_step, steps_per_snapshot=2, intervals=2)
+        >>> trajectory = jaxsph.simulate(scene.model(), scene.state, schedule)
         >>> trajectory.velocity.shape  # snapshots, particles, directions
         (3, 256, 2)
     """
-    if (steps - first_step) % steps_per_snapshot or steps <= first_step:
+    time_step, each = schedule.time_step, schedule.steps_per_snapshot
+    if first_step % each or first_step >= schedule.steps:
         raise ValueError(
-            f"steps: from {first_step} to {steps} must be a whole, positive number of intervals "
-            f"of {steps_per_snapshot} steps."
+            f"first_step: from {first_step} to {schedule.steps} must be a whole, positive number "
+            f"of intervals of {each} steps."
         )
     dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
     dt = jnp.asarray(time_step, dtype)
@@ -134,10 +132,10 @@ def simulate(
     compiled, enlarged_at = False, []
     if first_step == 0:
         record(0, model.observe(state))
-    while step < steps:
+    while step < schedule.steps:
         start = clock.perf_counter()
         new, fault, snapshot = jax.block_until_ready(
-            _interval(model, state, np.int32(step), dt, steps_per_snapshot, stepping)
+            _interval(model, state, np.int32(step), dt, each, stepping)
         )
         elapsed = clock.perf_counter() - start
         if not compiled:  # this interval runs once more, for its time without compilation
@@ -157,10 +155,10 @@ def simulate(
         if int(fault.code) != FaultCode.NONE:
             raise _failed(fault, model.likely_cause(fault, new, time_step))
         run_seconds += elapsed
-        state, step = new, step + steps_per_snapshot
+        state, step = new, step + each
         record(step, snapshot)
         if progress is not None:
-            progress(steps_per_snapshot)
+            progress(each)
     return trajectory()
 
 

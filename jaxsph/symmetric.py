@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .ramps import root
 from .vector import Vector
 
 _REGULAR = 1e-3  # of the determinant; a full neighbourhood's is 1
@@ -91,3 +92,21 @@ def _adjugate_3(a):
         (2, 2): a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1],
     }
     return found, sum(a[0, k] * found[0, k] for k in range(3))
+
+
+def smallest_eigenvalue(upper):
+    """Of symmetric matrices of size 2 or 3, given by rows (N, 3) or (N, 6) of upper triangles.
+
+    Where eigenvalues coincide the derivative counts as zero.
+    """
+    if upper.shape[1] == 3:
+        a, b, d = (upper[:, k] for k in range(3))
+        return 0.5 * (a + d) - root((0.5 * (a - d)) ** 2 + b * b)
+    a, b, c, d, e, f = (upper[:, k] for k in range(6))
+    mean = (a + d + f) / 3.0
+    a, d, f = a - mean, d - mean, f - mean
+    size = root((a * a + d * d + f * f + 2.0 * (b * b + c * c + e * e)) / 6.0)
+    safe = jnp.where(size > 0.0, size, 1.0)
+    determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
+    cosine = jnp.clip(0.5 * determinant / safe**3, -1.0 + 1e-9, 1.0 - 1e-9)
+    return mean + 2.0 * size * jnp.cos((jnp.arccos(cosine) + 2.0 * jnp.pi) / 3.0)

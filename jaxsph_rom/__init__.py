@@ -1,5 +1,9 @@
-"""Projection-based reduced models of smoothed-particle hydrodynamics."""
+"""Projection-based reduced models of smoothed-particle hydrodynamics.
 
+What this package and the packages inside it hand on is public; modules inside these may change.
+"""
+
+from . import points as points
 from .basis import Basis as Basis
 from .basis import Centring as Centring
 from .basis import Energy as Energy
@@ -23,6 +27,7 @@ from .mode_interpolation import ModeInterpolation as ModeInterpolation
 from .model import ReducedModel as ReducedModel
 from .model import ReducedState as ReducedState
 from .points import Compressible as Compressible
+from .points import Family as Family
 from .points import LinearClosure as LinearClosure
 from .points import Prediction as Prediction
 from .points import Samples as Samples

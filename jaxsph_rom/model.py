@@ -66,8 +66,7 @@ class ReducedModel(Model):
         >>> splines = LocalSplines.fit(np.asarray(reference.points), functions, scene.space)
         >>> model = ReducedModel.of_scene(scene, basis, splines, Galerkin())
         >>> reduced = jaxsph.simulate(
-        ...     model, model.project(scene.state), time_step=scene.time_step,
-        ...     steps=scene.steps, steps_per_snapshot=scene.steps_per_snapshot,
+        ...     model, model.project(scene.state), scene.schedule
         ... )
         >>> reduced.coordinates.shape  # snapshots, modes
         (4, 2)

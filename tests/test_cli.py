@@ -168,15 +168,10 @@ def test_a_full_neighbor_list_is_enlarged_and_the_run_goes_on():
     scene = taylor_green(16, arrangement=Lattice(), end_time=0.1)
     runs = []
     for margin in (1.0, 2.0):
-        steps = dict(time_step=scene.time_step, steps=scene.steps)
         model = scene.model(margin=margin)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            runs.append(
-                jaxsph.simulate(
-                    model, scene.state, **steps, steps_per_snapshot=scene.steps_per_snapshot
-                )
-            )
+            runs.append(jaxsph.simulate(model, scene.state, scene.schedule))
         told = [w for w in caught if "allocated it anew" in str(w.message)]
         assert len(told) == len(runs[-1].metadata["enlarged_at"])
     assert runs[0].metadata["enlarged_at"] and not runs[1].metadata["enlarged_at"]
@@ -195,9 +190,7 @@ def test_fault_keeps_all_snapshots_before_it(tmp_path):
             jaxsph.simulate(
                 scene.model(state, margin=3.0),
                 state,
-                time_step=scene.time_step,
-                steps=scene.steps,
-                steps_per_snapshot=scene.steps_per_snapshot,
+                scene.schedule,
                 recorder=writer,
             )
         assert caught.value.code == FaultCode.DENSITY_OUT_OF_BOUNDS

@@ -51,7 +51,7 @@ def test_killed_run_goes_on(tmp_path, capsys):
     run_and_kill([*RUN, "--out", str(killed)], path, snapshots=4)
     checkpoint = read_checkpoint(path)
     assert not checkpoint.complete
-    assert 4 <= checkpoint.step < checkpoint.steps == 100
+    assert 4 <= checkpoint.step < checkpoint.schedule.steps == 100
     before = read_trajectory(path)
     reports = [tmp_path / "resumed.json", tmp_path / "whole.json"]
     assert main(["run", "taylor-green", "--resume", str(path), "--json", str(reports[0])]) == 0
@@ -202,4 +202,4 @@ def test_a_finished_run_goes_on_to_a_later_end(tmp_path, capsys):
             assert np.max(np.abs(a - b)) <= 1e-12 * np.max(np.abs(b)), field
         assert found.metadata["parameters"] == wanted.metadata["parameters"]
         kept, like = read_checkpoint(name), read_checkpoint(tmp_path / "long" / "trajectory.h5")
-        assert (kept.steps, kept.complete, kept.content) == (12, True, like.content)
+        assert (kept.schedule.steps, kept.complete, kept.content) == (12, True, like.content)

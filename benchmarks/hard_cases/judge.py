@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph import SimulationError, Snapshot, Trajectory, simulate
+from jaxsph import Schedule, SimulationError, Snapshot, Trajectory, simulate
 from jaxsph.integrate import FaultCode, Model
 from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.scenes import Scene
@@ -58,10 +58,11 @@ class Run:
     predict: Callable[[], Trajectory] | None = None
 
     @property
-    def whole_steps(self) -> int:
-        """Steps in whole snapshot intervals."""
+    def schedule(self) -> Schedule:
+        """Its steps, in whole snapshot intervals."""
         steps = self.scene.steps if self.steps is None else self.steps
-        return -(-steps // self.steps_per_snapshot) * self.steps_per_snapshot
+        time_step = self.scene.time_step if self.time_step is None else self.time_step
+        return Schedule(time_step, self.steps_per_snapshot, -(-steps // self.steps_per_snapshot))
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def run_case(case: Case, progress: Callable = silent) -> Outcome:
             return Outcome(Ending.BROKEN, f"{type(error).__name__}: {error}", seconds=seconds)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "trajectory.h5")
-            with progress(case.name, run.whole_steps, 0) as report:
+            with progress(case.name, run.schedule.steps, 0) as report:
                 fault, recorded = _recorded(run, path, report)
             stored = read_trajectory(path) if recorded else None
         finished = fault is None
@@ -152,7 +153,7 @@ def run_case(case: Case, progress: Callable = silent) -> Outcome:
             finite=stored is None or all_finite(stored),
             values=values,
             enlarged=len(stored.metadata.get("enlarged_at", ())) if finished else 0,
-            steps=run.whole_steps,
+            steps=run.schedule.steps,
             seconds=clock.perf_counter() - start,
         )
 
@@ -189,9 +190,7 @@ def _simulated(run: Run, state, recorder: _Counted, report) -> Trajectory:
     return simulate(
         run.scene.model() if run.model is None else run.model,
         state,
-        time_step=run.scene.time_step if run.time_step is None else run.time_step,
-        steps=run.whole_steps,
-        steps_per_snapshot=run.steps_per_snapshot,
+        run.schedule,
         recorder=recorder,
         progress=report,
     )

@@ -11,9 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from jaxsph import Trajectory
+from jaxsph import Space, Trajectory
 from jaxsph.metrics import kinetic_energy
-from jaxsph.pairs import Space
 from jaxsph.scenes import Scene
 from jaxsph.scenes.hydrostatic_tank import GRAVITY, hydrostatic_pressure
 

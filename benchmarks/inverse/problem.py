@@ -12,10 +12,9 @@ import numpy as np
 import optax
 from jaxtyping import Array, Float
 
-from jaxsph import COMPILER_OPTIONS, FullModel, ParticleState, Snapshot
+from jaxsph import COMPILER_OPTIONS, FullModel, ParticleState, Snapshot, Space
 from jaxsph.integrate import FaultCode, explanation, integrate
 from jaxsph.interpolation import KernelMap, ShepardMap
-from jaxsph.pairs import Space
 from jaxsph.scenes import Scene
 
 from ..measure import progress

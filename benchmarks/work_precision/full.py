@@ -61,9 +61,7 @@ def _run(scene: Scene, setting: FullSetting, clocked: Clocked) -> Trajectory:
         return simulate(
             scene.model(margin=None if setting.shifting else _MARGIN_WITHOUT_SHIFTING),
             scene.state,
-            time_step=scene.time_step,
-            steps=scene.steps,
-            steps_per_snapshot=scene.steps_per_snapshot,
+            scene.schedule,
             progress=report,
         )
 

@@ -15,7 +15,7 @@ from mkdocs.structure.files import File
 
 ROOT = Path(__file__).parents[2]
 _TOPS = ("jaxsph", "jaxsph_rom")
-_ALONE = ("jaxsph.metrics",)  # modules that users import as they are
+_ALONE = ("jaxsph.environment", "jaxsph.metrics")  # modules that users import as they are
 _COMPUTED = re.compile(r"^@computed (?P<module>[\w.]+)$", re.MULTILINE)
 _BARE = (
     "{show_root_heading: false, show_root_toc_entry: false, show_signature: false, "

@@ -45,9 +45,7 @@ def simulate_and_report(
             trajectory = simulate(
                 model,
                 scene.state,
-                time_step=scene.time_step,
-                steps=scene.steps,
-                steps_per_snapshot=scene.steps_per_snapshot,
+                scene.schedule,
                 first_step=first_step,
                 recorder=_Progress(writer, bar, scene),
                 progress=bar.update,

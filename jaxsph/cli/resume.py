@@ -91,10 +91,10 @@ def resume(options, make: Callable[..., Scene]) -> int:
         checkpoint = read_checkpoint(path, _wanted_step(options, checkpoint))
         target = options.out / "trajectory.h5"
         check_target(target, overwrite=False)
-        if checkpoint.step == checkpoint.steps and options.t_end is None:
+        if checkpoint.step == checkpoint.schedule.steps and options.t_end is None:
             raise ValueError(f"{path}: step {checkpoint.step} is its last; name an earlier one.")
     elif options.t_end is None and _ended(path, checkpoint):
-        end = checkpoint.step * checkpoint.time_step
+        end = checkpoint.step * checkpoint.schedule.time_step
         print(f"{path} is complete ({checkpoint.step} steps to t = {end:g} s): nothing to do.")
         return 0
     check_target(target.with_name(REPORT))
@@ -128,20 +128,21 @@ def _wanted_step(options, checkpoint: Checkpoint) -> int:
     """The step whose snapshot is asked for."""
     if options.from_step is not None:
         return options.from_step
-    interval = checkpoint.steps_per_snapshot * checkpoint.time_step
+    schedule = checkpoint.schedule
+    interval = schedule.interval
     number = round(options.from_time / interval)
     if abs(options.from_time - number * interval) > _SAME_TIME * interval:
-        last = checkpoint.step * checkpoint.time_step
+        last = checkpoint.step * schedule.time_step
         raise ValueError(
             f"{options.resume}: holds no snapshot at t = {options.from_time:g} s; it has one every "
             f"{interval:g} s from 0 to {last:g} s."
         )
-    return number * checkpoint.steps_per_snapshot
+    return number * schedule.steps_per_snapshot
 
 
 def _ended(path: Path, checkpoint: Checkpoint) -> bool:
     """Whether there is nothing left to run; a file killed just before its last word gets it."""
-    if not checkpoint.complete and checkpoint.step == checkpoint.steps:
+    if not checkpoint.complete and checkpoint.step == checkpoint.schedule.steps:
         with TrajectoryWriter.append_to(path) as writer:
             writer.finish()
         return True
@@ -154,8 +155,7 @@ def _restored(path: Path, checkpoint: Checkpoint, end_time: float | None) -> Sce
     rule = checkpoint.parameters.get("arrangement", {}).get("rule")
     spared = Lattice() if state is not None and rule in _COSTLY else None
     scene = scene_from_record(checkpoint.scene, checkpoint.parameters, spared)
-    same = ("time_step", "steps", "steps_per_snapshot")
-    fits = all(getattr(scene, name) == getattr(checkpoint, name) for name in same)
+    fits = scene.schedule == checkpoint.schedule
     if state is not None:
         fits = fits and state.position.shape == scene.state.position.shape
     if not fits:

@@ -15,6 +15,7 @@ from .consistent_viscosity import ConsistentViscosity as ConsistentViscosity
 from .continuity import Continuity as Continuity
 from .density_diffusion import DensityDiffusion as DensityDiffusion
 from .free_surface import FreeSurface as FreeSurface
+from .gripped_pressure_force import GrippedPressureForce as GrippedPressureForce
 from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
 from .kernel_correction import KernelCorrection as KernelCorrection
 from .laminar_viscosity import LaminarViscosity as LaminarViscosity

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from ..at_ghosts import Same
 from ..pairs import PairTerm
 from ..ramps import ramp, root
+from ..symmetric import smallest_eigenvalue
 from ..vector import Vector
 from .base import Effect
 from .kernel_gradient import KERNEL_GRADIENT
@@ -62,24 +63,6 @@ class FreeSurface(Effect):
             "interior": ramp(completeness, *_INTERIOR),
             "coherent": ramp(completeness, *_SPLASH),
         }
-
-
-def smallest_eigenvalue(upper):
-    """Of symmetric matrices of size 2 or 3, given by rows (N, 3) or (N, 6) of upper triangles.
-
-    Where eigenvalues coincide the derivative counts as zero.
-    """
-    if upper.shape[1] == 3:
-        a, b, d = (upper[:, k] for k in range(3))
-        return 0.5 * (a + d) - root((0.5 * (a - d)) ** 2 + b * b)
-    a, b, c, d, e, f = (upper[:, k] for k in range(6))
-    mean = (a + d + f) / 3.0
-    a, d, f = a - mean, d - mean, f - mean
-    size = root((a * a + d * d + f * f + 2.0 * (b * b + c * c + e * e)) / 6.0)
-    safe = jnp.where(size > 0.0, size, 1.0)
-    determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
-    cosine = jnp.clip(0.5 * determinant / safe**3, -1.0 + 1e-9, 1.0 - 1e-9)
-    return mean + 2.0 * size * jnp.cos((jnp.arccos(cosine) + 2.0 * jnp.pi) / 3.0)
 
 
 def _direction(vectors, space):

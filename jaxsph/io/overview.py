@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..schedule import Schedule
 from ..trajectory import Snapshot
-from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient
+from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, schedule_of
 
 
 @dataclass(frozen=True)
@@ -22,9 +23,7 @@ class Overview:
         mass: of a particle [kg]; None if that is not recorded.
         versions: of the software that wrote the file, by name.
         metadata: of the trajectory; with run times once it is complete.
-        time_step: dt [s].
-        steps: number of the run's last step.
-        steps_per_snapshot: between snapshots.
+        schedule: of the whole run.
         complete: whether the run has ended.
         snapshots: how many are stored.
         step, time: of the last one; -1 and 0 s if there is none.
@@ -39,9 +38,7 @@ class Overview:
     mass: float | None
     versions: dict[str, str]
     metadata: dict[str, Any]
-    time_step: float
-    steps: int
-    steps_per_snapshot: int
+    schedule: Schedule
     complete: bool
     snapshots: int
     step: int
@@ -69,9 +66,7 @@ def read_overview(path: str | os.PathLike) -> Overview:
             mass=float(attributes["mass"]) if "mass" in attributes else None,
             versions=json.loads(attributes.get("versions", "{}")),
             metadata=json.loads(attributes["metadata"]),
-            time_step=float(attributes["time_step"]),
-            steps=int(attributes["steps"]),
-            steps_per_snapshot=int(attributes["steps_per_snapshot"]),
+            schedule=schedule_of(file),
             complete=bool(attributes["complete"]),
             snapshots=count,
             step=int(file["step"][count - 1]) if count else -1,

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from ..schedule import Schedule
 from ..trajectory import Trajectory
 from .trajectory_writer import TrajectoryWriter
 
@@ -33,15 +34,14 @@ def save_trajectory(
     shortest = intervals.min() if len(intervals) else 1.0
     time_step = min(float(metadata.get("time_step", shortest)), shortest)
     steps = np.rint(time / time_step).astype(int)  # differ, as no interval is below a step
+    each = max(1, int(np.gcd.reduce(steps)))  # where times are even: from snapshot to snapshot
     record = SimpleNamespace(
         name=str(metadata.get("scene", "trajectory")),
         parameters=metadata.get("parameters", {}),
         effects=(),
         mass=None,
         state=trajectory.state(0),
-        time_step=time_step,
-        steps=steps[-1],
-        steps_per_snapshot=max(1, round(shortest / time_step)),
+        schedule=Schedule(time_step, each, int(steps[-1]) // each),
     )
     coordinates = trajectory.coordinates
     modes = None if coordinates is None else coordinates.shape[1]

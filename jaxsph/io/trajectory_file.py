@@ -17,6 +17,7 @@ import numpy as np
 
 from ..content import differences
 from ..particles import ParticleState
+from ..schedule import Schedule
 from ..trajectory import Trajectory
 from .unclosed_file import open_to_read
 
@@ -46,9 +47,7 @@ class Checkpoint:
 
     Args:
         scene, parameters: name and record of the scene.
-        time_step: dt [s].
-        steps: number of the run's last step.
-        steps_per_snapshot: between snapshots.
+        schedule: of the whole run.
         complete: whether the run has ended.
         step: number of the last stored step, or of the one asked for; -1 if there is none.
         state: the particles at that step.
@@ -57,9 +56,7 @@ class Checkpoint:
 
     scene: str
     parameters: dict[str, Any]
-    time_step: float
-    steps: int
-    steps_per_snapshot: int
+    schedule: Schedule
     complete: bool
     step: int
     state: ParticleState | None
@@ -121,6 +118,17 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
         return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
 
 
+def read_walls(path: str | os.PathLike) -> np.ndarray | None:
+    """Where the walls of a run have their ghosts (G, n) [m], but those of bodies that are moved;
+    None where there are none, or none are known.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file.
+    """
+    with opened(Path(path)) as (file, _):
+        return file["walls/position"][:] if "walls/position" in file else None
+
+
 @patient
 def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpoint:
     """What a file says of its run, and the particles of a snapshot.
@@ -143,14 +151,18 @@ def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpo
         return Checkpoint(
             scene=_text(file.attrs["scene"]),
             parameters=json.loads(_text(file.attrs["parameters"])),
-            time_step=float(file.attrs["time_step"]),
-            steps=int(file.attrs["steps"]),
-            steps_per_snapshot=int(file.attrs["steps_per_snapshot"]),
+            schedule=schedule_of(file),
             complete=bool(file.attrs["complete"]),
             step=int(file["step"][count - 1]) if count else -1,
             state=state,
             content=json.loads(_text(file.attrs["content"])) if "content" in file.attrs else None,
         )
+
+
+def schedule_of(file: h5py.File) -> Schedule:
+    """The steps of the run in a file."""
+    each = int(file.attrs["steps_per_snapshot"])
+    return Schedule(float(file.attrs["time_step"]), each, int(file.attrs["steps"]) // each)
 
 
 def count_up_to(path: str | os.PathLike, stored: np.ndarray, step: int) -> int:

@@ -79,8 +79,8 @@ class TrajectoryWriter:
 
         Args:
             path: of the file.
-            scene: gives name, parameters, steps, effects, the mass of a particle [kg] (None where
-                they have none), and the particles' number and precision.
+            scene: gives name, parameters, schedule, effects, the mass of a particle [kg] (None
+                where they have none), and the particles' number and precision.
             modes: number of reduced coordinates that snapshots carry, if any.
             metadata: kept with the trajectory, JSON-like.
             made_by: the `content` of what makes the run; that of the scene if none is given.
@@ -107,9 +107,10 @@ class TrajectoryWriter:
             file.attrs["scene"] = scene.name
             file.attrs["parameters"] = _to_json(scene.parameters)
             file.attrs["content"] = json.dumps(dict(made_by))
-            file.attrs["time_step"] = float(scene.time_step)
-            file.attrs["steps"] = int(scene.steps)
-            file.attrs["steps_per_snapshot"] = int(scene.steps_per_snapshot)
+            schedule = scene.schedule
+            file.attrs["time_step"] = float(schedule.time_step)
+            file.attrs["steps"] = int(schedule.steps)
+            file.attrs["steps_per_snapshot"] = int(schedule.steps_per_snapshot)
             file.attrs["complete"] = False
             file.attrs["effects"] = json.dumps([effect.name for effect in scene.effects])
             if scene.mass is not None:
@@ -121,6 +122,9 @@ class TrajectoryWriter:
                 add_dataset(file, name, shape, np.dtype(state.position.dtype), **COMPRESSION)
             add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
             add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
+            walls = getattr(scene, "walls", None)
+            if walls is not None:
+                file.create_group("walls")["position"] = np.float32(walls.fixed_position)
 
         return cls(path, fill)
 
@@ -146,7 +150,8 @@ class TrajectoryWriter:
                 _copy_attributes(source, file, scene)
                 for name in source:
                     source.copy(name, file)
-                    file[name].resize(count, 0)
+                    if name in UNITS:
+                        file[name].resize(count, 0)
 
         return cls(path, fill)
 
@@ -178,6 +183,9 @@ class TrajectoryWriter:
                 metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
                 for name in old:
+                    if name not in UNITS:
+                        old.copy(name, file)
+                        continue
                     like = old[name]
                     add_dataset(
                         file, name, like.shape[1:], like.dtype, fillvalue=like.fillvalue,

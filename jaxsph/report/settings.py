@@ -10,12 +10,12 @@ from ..io import Overview
 
 def scene_rows(overview: Overview) -> dict[str, str]:
     """What was run."""
-    interval = overview.steps_per_snapshot * overview.time_step
+    schedule = overview.schedule
     return {
         "scene": overview.scene,
         "effects": ", ".join(overview.effects) or "not recorded",
         "particles": f"{overview.particles}, in {overview.dim} dimensions, {overview.dtype}",
-        "stepping": f"dt = {overview.time_step:g} s, a snapshot every {interval:g} s",
+        "stepping": f"dt = {schedule.time_step:g} s, a snapshot every {schedule.interval:g} s",
         **parameter_rows(overview.parameters),
     }
 

@@ -1,5 +1,7 @@
 """Scenes, one a file; `SCENES` lists them by the name that users type."""
 
+from . import plane_flow_solution as plane_flow_solution
+from . import taylor_green_solution as taylor_green_solution
 from .balanced import balanced as balanced
 from .composed import composed as composed
 from .continued import continued as continued

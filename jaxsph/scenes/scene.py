@@ -14,6 +14,7 @@ from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
 from ..particles import ParticleState, in_dtype
+from ..schedule import Schedule
 from ..shown import concrete, line, table
 from ..walls import Walls
 from ..walls.filling import refuse_rows_at_walls, volume
@@ -73,8 +74,7 @@ class Scene(eqx.Module):
             self.solution = Solution.of(self, self.solution)
 
     def __check_init__(self):
-        if self.steps_per_snapshot < 1:
-            raise ValueError(f"steps_per_snapshot: at least 1, got {self.steps_per_snapshot}.")
+        schedule = self.schedule
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
             if beyond.any():
@@ -95,13 +95,12 @@ class Scene(eqx.Module):
                 "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
                 "wall, and the limits of other effects); choose one below it."
             )
-        reached = self.steps * self.time_step
-        if abs(reached - self.end_time) > 1e-6 * self.end_time:
+        if abs(schedule.end_time - self.end_time) > 1e-6 * self.end_time:
             interval = self.steps_per_snapshot
             raise ValueError(
                 f"time step: {interval} steps of {self.time_step:g} s (from snapshot to snapshot) "
                 f"do not divide the end time of {self.end_time:g} s; the nearest step that does "
-                f"is {self.end_time / self.steps:.6g} s."
+                f"is {self.end_time / schedule.steps:.6g} s."
             )
 
     @property
@@ -134,10 +133,14 @@ class Scene(eqx.Module):
         return min(acoustic, *limits, *start)
 
     @property
+    def schedule(self) -> Schedule:
+        """The steps of the run."""
+        return Schedule.until(self.end_time, self.time_step, self.steps_per_snapshot)
+
+    @property
     def steps(self) -> int:
-        """Steps of the run, a whole number of snapshot intervals."""
-        intervals = max(1, round(self.end_time / (self.time_step * self.steps_per_snapshot)))
-        return intervals * self.steps_per_snapshot
+        """Number of them."""
+        return self.schedule.steps
 
     @property
     def mass(self):

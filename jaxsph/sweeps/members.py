@@ -15,7 +15,7 @@ from ..neighbors import NeighborSearch, WalledSearch
 from ..particles import ParticleState
 from ..scenes import Scene
 
-_SAME = ("name", "space", "time_step", "steps", "steps_per_snapshot")
+_SAME = ("name", "space", "schedule")
 
 
 class Members(eqx.Module):

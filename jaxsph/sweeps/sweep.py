@@ -115,14 +115,15 @@ class _Run(NamedTuple):
 
 
 def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
-    intervals = scene.steps // scene.steps_per_snapshot
+    schedule = scene.schedule
 
     def member(arrays):
         model, state = members.one(arrays)
-        step = jnp.asarray(scene.time_step, state.density.dtype)
+        step = jnp.asarray(schedule.time_step, state.density.dtype)
+        each, intervals = schedule.steps_per_snapshot, schedule.intervals
         first = model.observe(state)
         _, fault, later, good = integrate(
-            model, state, jnp.zeros((), jnp.int32), step, scene.steps_per_snapshot, intervals
+            model, state, jnp.zeros((), jnp.int32), step, each, intervals
         )
         sound = jnp.all(jnp.isfinite(state.density + jnp.sum(state.velocity, axis=1)))
         count = jnp.where(sound, 1 + jnp.sum(good, dtype=jnp.int32), 0)

@@ -64,7 +64,7 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
         _check(path, identity, contents)
         return
     state = first.state
-    times = 1 + first.steps // first.steps_per_snapshot
+    times = first.schedule.times
     shapes = {"position": state.position.shape, "velocity": state.velocity.shape}
     shapes |= {"density": state.density.shape, "pressure": state.density.shape}
     try:
@@ -74,14 +74,13 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
             file.attrs["identity"] = identity
             file["content"] = [json.dumps(content) for content in contents]
             file.attrs["time_step"] = first.time_step
-            steps = np.arange(times) * first.steps_per_snapshot
-            file["time"] = steps * first.time_step
+            file["time"] = times
             file["time"].attrs["unit"] = "s"
             for name, shape in shapes.items():
                 early = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
                 early.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
                 early.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-                whole = (len(scenes), times, *shape)
+                whole = (len(scenes), len(times), *shape)
                 data = file.create_dataset(name, whole, np.dtype(state.density.dtype), dcpl=early)
                 data.attrs["unit"] = _UNITS[name]
             for name in ("code", "step", "particle", "snapshots"):

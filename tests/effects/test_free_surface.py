@@ -24,11 +24,11 @@ from jaxsph.effects import (
     SurfaceTension,
     TensileControl,
 )
-from jaxsph.effects.free_surface import smallest_eigenvalue
 from jaxsph.kernels import WendlandC2
 from jaxsph.neighbors import NeighborSearch
 from jaxsph.pairs import Space
 from jaxsph.scenes import dam_break, hydrostatic_tank, oscillating_drop, taylor_green
+from jaxsph.symmetric import smallest_eigenvalue
 
 DX = 0.05
 FLUID = Fluid(1.0, 10.0, 1.0)

@@ -70,11 +70,8 @@ def test_a_value_that_is_not_finite_ends_a_run_of_rates_alone():
 
 def velocity(scene, stepping):
     """After the first interval between snapshots."""
-    each = scene.steps_per_snapshot
-    return simulate(
-        scene.model(), scene.state, time_step=scene.time_step, steps=each, steps_per_snapshot=each,
-        stepping=stepping,
-    ).velocity[-1]  # fmt: skip
+    first = dataclasses.replace(scene.schedule, intervals=1)
+    return simulate(scene.model(), scene.state, first, stepping=stepping).velocity[-1]
 
 
 def test_the_full_model_takes_it_in_both_kinds_of_steps():

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import SimulationError, run_scene, simulate
+from jaxsph import Schedule, SimulationError, run_scene, simulate
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import SurfaceTension
 from jaxsph.integrate import AutomaticSteps, FaultCode, FixedSteps, integrate
@@ -23,15 +23,7 @@ def scene():
 
 
 def run(scene, stepping):
-    each = scene.steps_per_snapshot
-    return simulate(
-        scene.model(),
-        scene.state,
-        time_step=scene.time_step,
-        steps=scene.steps,
-        steps_per_snapshot=each,
-        stepping=stepping,
-    )
+    return simulate(scene.model(), scene.state, scene.schedule, stepping=stepping)
 
 
 def test_where_the_limits_allow_dt_the_steps_are_those_of_dt(scene):
@@ -80,9 +72,7 @@ def test_intervals_that_do_not_end_are_named(scene):
         simulate(
             model,
             scene.state,
-            time_step=scene.time_step,
-            steps=2,
-            steps_per_snapshot=2,
+            Schedule(scene.time_step, 2, 1),
             stepping=AutomaticSteps(most=2),
         )
 
@@ -90,8 +80,8 @@ def test_intervals_that_do_not_end_are_named(scene):
 def test_a_broken_state_is_named_not_stepped_over(scene):
     broken = eqx.tree_at(lambda s: s.density, scene.state, scene.state.density.at[3].set(5e3))
     with pytest.raises(SimulationError) as error:
-        simulate(scene.model(), broken, time_step=scene.time_step, steps=4, steps_per_snapshot=4,
-                 stepping=AutomaticSteps())  # fmt: skip
+        four = Schedule(scene.time_step, 4, 1)
+        simulate(scene.model(), broken, four, stepping=AutomaticSteps())
     assert error.value.code in (FaultCode.DENSITY_OUT_OF_BOUNDS, FaultCode.NOT_FINITE)
 
 

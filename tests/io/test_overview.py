@@ -21,8 +21,8 @@ def test_overview(tmp_path):
     assert overview.effects[:2] == ("KernelCorrection", "AdjointPressure")
     assert overview.mass == pytest.approx(1000.0 / 16**3)
     assert (overview.snapshots, overview.complete, overview.dtype) == (3, False, "float32")
-    assert overview.step == 2 * overview.steps_per_snapshot < overview.steps
-    assert overview.time == pytest.approx(overview.step * overview.time_step)
+    assert overview.step == 2 * overview.schedule.steps_per_snapshot < overview.schedule.steps
+    assert overview.time == pytest.approx(overview.step * overview.schedule.time_step)
     assert overview.size == path.stat().st_size and "jaxsph" in overview.versions
     empty = read_overview(random_run(tmp_path / "empty.h5", count=0))
     assert (empty.snapshots, empty.step, empty.time) == (0, -1, 0.0)
@@ -43,7 +43,7 @@ def test_single_snapshots(tmp_path):
 
 def test_checkpoint_of_a_step(tmp_path):
     path = random_run(tmp_path / "t.h5")
-    interval = read_overview(path).steps_per_snapshot
+    interval = read_overview(path).schedule.steps_per_snapshot
     found = read_checkpoint(path, 2 * interval)
     assert found.step == 2 * interval
     np.testing.assert_array_equal(found.state.density, read_trajectory(path).density[2])
@@ -54,7 +54,7 @@ def test_checkpoint_of_a_step(tmp_path):
 
 def test_a_branch_begins_with_what_came_before(tmp_path):
     source = random_run(tmp_path / "t.h5", finish=True)
-    interval = read_overview(source).steps_per_snapshot
+    interval = read_overview(source).schedule.steps_per_snapshot
     before = source.read_bytes()
     with TrajectoryWriter.branch(source, tmp_path / "new" / "t.h5", 2 * interval) as writer:
         assert writer.last_step == 2 * interval

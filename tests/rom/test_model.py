@@ -231,9 +231,7 @@ def test_the_reduced_model_follows_the_decay(trained, projection):
     result = jaxsph.simulate(
         model,
         start,
-        time_step=scene.time_step,
-        steps=scene.steps,
-        steps_per_snapshot=scene.steps_per_snapshot,
+        scene.schedule,
     )
     assert result.coordinates.shape == (len(run.time), 1)
     energy = [np.sum(t.velocity[-1] ** 2) / np.sum(t.velocity[0] ** 2) for t in (run, result)]
@@ -250,4 +248,4 @@ def test_a_blow_up_is_named(trained):
     start = eqx.filter_jit(model.project)(scene.state)
     wild = ReducedState(start.coordinates * 1e3, start.position)
     with pytest.raises(jaxsph.SimulationError, match="step 1"):
-        jaxsph.simulate(model, wild, time_step=scene.time_step, steps=4, steps_per_snapshot=2)
+        jaxsph.simulate(model, wild, jaxsph.Schedule(scene.time_step, 2, 2))

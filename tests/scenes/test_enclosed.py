@@ -208,9 +208,7 @@ def test_a_particle_thrown_at_a_wall_is_named(cavity, cavity_model):
         simulate(
             cavity_model,
             state,
-            time_step=cavity.time_step,
-            steps=cavity.steps_per_snapshot,
-            steps_per_snapshot=cavity.steps_per_snapshot,
+            dataclasses.replace(cavity.schedule, intervals=1),
         )
     assert error.value.code == FaultCode.BEYOND_WALL
     assert (error.value.step, error.value.particle) == (1, number)

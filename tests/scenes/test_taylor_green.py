@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from jaxsph import Box, FullModel, ParticleState, Space, run_scene, simulate
+from jaxsph import Box, FullModel, ParticleState, Schedule, Space, run_scene, simulate
 from jaxsph.arrangements import JitteredLattice, Lattice, Packed
 from jaxsph.effects import ParticleShifting, ShiftingTransport
 from jaxsph.kernels import WendlandC2
@@ -116,14 +116,9 @@ def test_three_dimensional_vortices_decay():
 
 
 def go_on(scene, model, state, steps, first_step=0):
-    return simulate(
-        model,
-        state,
-        time_step=scene.time_step,
-        steps=steps,
-        first_step=first_step,
-        steps_per_snapshot=scene.steps_per_snapshot,
-    )
+    each = scene.steps_per_snapshot
+    schedule = Schedule(scene.time_step, each, steps // each)
+    return simulate(model, state, schedule, first_step=first_step)
 
 
 class AlwaysRebuilt(FullModel):

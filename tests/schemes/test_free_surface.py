@@ -15,9 +15,9 @@ from jaxsph.effects import (
     Context,
     FreeSlip,
     FreeSurface,
+    GrippedPressureForce,
     KernelCorrection,
     PairRepulsion,
-    PressureForce,
     VelocityDiffusion,
     WallPressure,
 )
@@ -31,7 +31,7 @@ from jaxsph.vector import Vector
 from .test_energy import CORNERED, energy_rate
 from .vessels import disturbed, rates_of, vessel
 
-WALLS = (FreeSurface(), AdjointContinuity(), PressureForce(), WallPressure(), FreeSlip())
+WALLS = (FreeSurface(), AdjointContinuity(), GrippedPressureForce(), WallPressure(), FreeSlip())
 
 
 def of(effects, **options):
@@ -52,11 +52,34 @@ def test_walls_and_free_surface_only_exchange_energy(options):
     assert abs(energy_rate(scene, disturbed(scene))) < 1e-13  # round-off
 
 
+def film(scene):
+    """Its particles beside the first wall of the first direction: a single layer."""
+    layer = np.asarray(scene.state.position[:, 0]) < scene.space.box.lower[0] + scene.space.spacing
+    return dataclasses.replace(scene, state=jax.tree.map(lambda a: a[layer], scene.state))
+
+
+@pytest.mark.parametrize("options", [dict(side=14), dict(side=10, dim=3)], ids=str)
+def test_a_film_slides_along_its_wall(options):
+    scene = film(of(WALLS, **options))
+    found = rates_of(scene)(disturbed(scene)).velocity
+    middle = np.asarray(scene.state.position[:, 1:])
+    assert abs(energy_rate(scene, disturbed(scene))) < 1e-13
+    # ghosts beyond the ends of the wall have other normals
+    reach, box = scene.space.support, scene.space.box
+    inner = ((middle > np.asarray(box.lower[1:]) + reach)
+             & (middle < np.asarray(box.upper[1:]) - reach)).all(axis=1)  # fmt: skip
+    assert inner.any()
+    alone = dataclasses.replace(scene, walls=None)
+    between = rates_of(alone)(disturbed(alone)).velocity
+    apart = np.asarray(found - between)[inner]
+    assert np.abs(apart[:, 1:]).max() < 1e-12 * np.abs(apart[:, 0]).max()
+
+
 def test_a_ghost_gathers_the_velocity_relative_to_its_wall():
     pair = SimpleNamespace(gradient=Vector((0.3, 0.7)), kernel=1.0)
     row = SimpleNamespace(
         velocity=Vector((1.0, 2.0)), wall_velocity=Vector((1.0, 2.0)), gathered_flux=0.0,
-        volume=1.0,
+        volume=1.0, normal=Vector((0.0, 1.0)), wall_grip=0.3,
     )  # fmt: skip
     assert moving_ghost_flux(pair, row, row) == 0.0
     assert moving_wall_divergence(pair, row, row) == 0.0

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jaxsph import ParticleState, Trajectory, simulate
+from jaxsph import ParticleState, Schedule, Trajectory, simulate
 from jaxsph.io import TrajectoryWriter
 from jaxsph.trajectory import Snapshot
 
@@ -27,9 +27,7 @@ class _Recorded:
 
     name: str
     parameters: dict[str, Any]
-    time_step: float
-    steps: int
-    steps_per_snapshot: int
+    schedule: Schedule
     state: ParticleState
     effects: tuple[()] = ()  # a reduced model has none
     mass: None = None  # what points and tracers stand for differs from run to run
@@ -77,9 +75,7 @@ def write_tracers(
         run = simulate(
             model,
             start,
-            time_step=trained.time_step,
-            steps=(len(prediction.time) - 1) * trained.steps_per_snapshot,
-            steps_per_snapshot=trained.steps_per_snapshot,
+            _schedule(trained, prediction),
             recorder=writer,
             progress=progress,
             metadata={"scene": trained.scene, "tracers": True},
@@ -97,8 +93,9 @@ def _created(path, trained, prediction, member, state) -> TrajectoryWriter:
         "outside": bool(prediction.outside[member]),
         "error_indicator": float(prediction.error_indicator[member]),
     }
-    steps = (len(prediction.time) - 1) * trained.steps_per_snapshot
-    run = _Recorded(
-        trained.scene, parameters, trained.time_step, steps, trained.steps_per_snapshot, state
-    )
+    run = _Recorded(trained.scene, parameters, _schedule(trained, prediction), state)
     return TrajectoryWriter.create(path, run, modes=trained.flow.basis.size, overwrite=True)
+
+
+def _schedule(trained, prediction) -> Schedule:
+    return Schedule(trained.time_step, trained.steps_per_snapshot, len(prediction.time) - 1)

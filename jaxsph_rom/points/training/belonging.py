@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -33,13 +34,13 @@ def check_runs(
         raise ValueError(f"runs: {len(runs)} of them for {len(scenes)} sets of parameters.")
     records = [_record(scene.parameters) for scene in scenes]
     for k, (scene, run) in enumerate(zip(scenes, runs, strict=True)):
-        count = 1 + scene.steps // scene.steps_per_snapshot
-        wanted = scene.time_step * scene.steps_per_snapshot * np.arange(count)
-        if len(run.time) != count or not np.allclose(run.time, wanted, rtol=1e-5, atol=0.0):
+        wanted = scene.schedule.times
+        if len(run.time) != len(wanted) or not np.allclose(run.time, wanted, rtol=1e-5, atol=0.0):
             last = float(run.time[-1]) if len(run.time) else 0.0
             raise ValueError(
                 f"runs: number {k} has {len(run.time)} snapshots to t = {last:g} s, the scene of "
-                f"{named(k)} {count} to {scene.end_time:g} s; give the whole run with all of them."
+                f"{named(k)} {len(wanted)} to {scene.end_time:g} s; give the whole run "
+                "with all of them."
             )
         recorded = run.metadata.get("parameters")
         if recorded is not None and _record(recorded) != records[k]:
@@ -66,11 +67,7 @@ def _check_start(scene: Scene, run: Trajectory, k: int, named) -> None:
 
 
 def _check_first_interval(scene: Scene, run: Trajectory, k: int, named) -> None:
-    steps = scene.steps_per_snapshot
-    again = simulate(
-        scene.model(), scene.state, time_step=scene.time_step, steps=steps,
-        steps_per_snapshot=steps,
-    )  # fmt: skip
+    again = simulate(scene.model(), scene.state, dataclasses.replace(scene.schedule, intervals=1))
     change = np.abs(again.velocity[1] - again.velocity[0]).max()
     apart = np.abs(again.velocity[1] - run.velocity[1]).max()
     least = 1e-6 * float(scene.fluid.reference_speed)
