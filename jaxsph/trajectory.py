@@ -75,7 +75,8 @@ class Trajectory(eqx.Module):
 
         Args:
             time: [s]; the end if none is given.
-            options: of `jaxsph.plotting.snapshot_figure`: `fields`.
+            options: of `jaxsph.plotting.snapshot_figure`: `fields`, and `walls`, which those of a
+                scene have as `scene.walls.fixed_position`.
         """
         from .plotting import snapshot_figure
 
@@ -87,7 +88,7 @@ class Trajectory(eqx.Module):
 
         Args:
             path: of the picture, ending with `.gif` or `.mp4`; one that is there is replaced.
-            options: of `jaxsph.plotting.animate`, as `field` and `every`.
+            options: of `jaxsph.plotting.animate`, as `field`, `every`, and `walls` as for `plot`.
 
         Raises:
             ValueError: as `jaxsph.plotting.animate`.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-from ..io import Overview, check_target, read_overview, read_snapshot
+from ..io import Overview, check_target, read_overview, read_snapshot, read_walls
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
@@ -51,7 +51,8 @@ def _show(options) -> int:
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
-        save(snapshot_figure(*read_snapshot(options.file)), options.figure)
+        walls = read_walls(options.file)
+        save(snapshot_figure(*read_snapshot(options.file), walls=walls), options.figure)
         print_rows({"figure": str(options.figure)})
     return 0
 

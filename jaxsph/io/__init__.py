@@ -12,6 +12,7 @@ from .trajectory_file import Checkpoint as Checkpoint
 from .trajectory_file import TrajectoryFileError as TrajectoryFileError
 from .trajectory_file import read_checkpoint as read_checkpoint
 from .trajectory_file import read_trajectory as read_trajectory
+from .trajectory_file import read_walls as read_walls
 from .trajectory_writer import TrajectoryWriter as TrajectoryWriter
 from .vtkhdf import write_vtkhdf as write_vtkhdf
 from .whole_file import whole_file as whole_file

@@ -118,6 +118,17 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
         return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
 
 
+def read_walls(path: str | os.PathLike) -> np.ndarray | None:
+    """Where the walls of a run have their ghosts (G, n) [m], but those of bodies that are moved;
+    None where there are none, or none are known.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file.
+    """
+    with opened(Path(path)) as (file, _):
+        return file["walls/position"][:] if "walls/position" in file else None
+
+
 @patient
 def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpoint:
     """What a file says of its run, and the particles of a snapshot.

@@ -122,6 +122,9 @@ class TrajectoryWriter:
                 add_dataset(file, name, shape, np.dtype(state.position.dtype), **COMPRESSION)
             add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
             add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
+            walls = getattr(scene, "walls", None)
+            if walls is not None:
+                file.create_group("walls")["position"] = np.float32(walls.fixed_position)
 
         return cls(path, fill)
 
@@ -147,7 +150,8 @@ class TrajectoryWriter:
                 _copy_attributes(source, file, scene)
                 for name in source:
                     source.copy(name, file)
-                    file[name].resize(count, 0)
+                    if name in UNITS:
+                        file[name].resize(count, 0)
 
         return cls(path, fill)
 
@@ -179,6 +183,9 @@ class TrajectoryWriter:
                 metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
                 for name in old:
+                    if name not in UNITS:
+                        old.copy(name, file)
+                        continue
                     like = old[name]
                     add_dataset(
                         file, name, like.shape[1:], like.dtype, fillvalue=like.fillvalue,

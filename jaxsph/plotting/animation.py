@@ -13,10 +13,10 @@ import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from ..io import check_target, snapshot_blocks
+from ..io import check_target, read_walls, snapshot_blocks
 from ..trajectory import Trajectory
 from .fields import VELOCITY, ParticleField
-from .particles import draw_particles, fit_squares, middle_layer, spacing
+from .particles import draw_particles, draw_walls, fit_squares, middle_layer, spacing
 from .snapshot import label_panel, panel_size
 from .style import INK, TEXT, sheet
 
@@ -35,8 +35,8 @@ def animate(
 ) -> Path:
     """Draw the particles of a trajectory file, coloured by a field, at all its times.
 
-    Axes span the whole run, colours all but one percent of its values at either end. The file is
-    read twice, one snapshot at a time. The frames of a GIF are held in memory until its end, about
+    Axes span the whole run and its walls, colours all but one percent of its values at either end.
+    The file is read twice, one snapshot at a time. The frames of a GIF are held in memory until its end, about
     a megabyte each; those of an MP4 are not.
 
     Args:
@@ -53,9 +53,8 @@ def animate(
         TrajectoryFileError: if the source is not a whole trajectory file with a snapshot in it, or
             the picture's folder does not serve.
     """
-    return draw_animation(
-        partial(snapshot_blocks, source, 1), path, field, every, frames_per_second, progress
-    )
+    blocks, walls = partial(snapshot_blocks, source, 1), read_walls(source)
+    return draw_animation(blocks, path, field, every, frames_per_second, progress, walls)
 
 
 def draw_animation(
@@ -65,8 +64,10 @@ def draw_animation(
     every: int = 1,
     frames_per_second: int = 15,
     progress: Callable[[int], None] | None = None,
+    walls: np.ndarray | None = None,
 ) -> Path:
-    """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew."""
+    """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew, and
+    with walls whose ghosts are at given places (G, n) [m]."""
     path = Path(path)
     if path.suffix not in _WRITERS:
         raise ValueError(f"{path}: pictures end with {' or '.join(_WRITERS)}; name it so.")
@@ -80,17 +81,19 @@ def draw_animation(
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
         with matplotlib.rc_context(settings):
-            _draw(blocks, writer, part, field, view, progress)
+            _draw(blocks, writer, part, field, view, progress, walls)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
     return path
 
 
-def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, progress) -> None:
+def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, progress, walls):
     """All frames into a picture."""
     first = next(blocks)
-    width, height = panel_size(np.stack([view.low, view.high]))
+    corners = np.stack([view.low, view.high])
+    flat = walls is not None and walls.shape[1] == 2
+    width, height = panel_size(np.concatenate([corners, walls]) if flat else corners)
     figure = sheet(width + 1.6, height + 0.9)
     axes = figure.subplots()
     color_map, limits = field.colours(*view.values)
@@ -100,9 +103,10 @@ def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, p
         xlim=(view.low[0] - margin, view.high[0] + margin),
         ylim=(view.low[1] - margin, view.high[1] + margin),
     )
+    still = draw_walls(axes, walls)
     label_panel(figure, axes, squares, field.label, extend="both")
     title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
-    fit_squares(figure, [(axes, squares)])
+    fit_squares(figure, [(axes, squares, *still)])
     figure.set_layout_engine("none")  # nothing moves but the particles
     with writer.saving(figure, str(path), _DPI):
         block = first

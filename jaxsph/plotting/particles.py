@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
-from .style import FAINT, INK, SMALL
+from .style import FAINT, INK, SMALL, WALL
 
 OVERLAP = 1.25  # side of a square in particle spacings; disorder would leave gaps otherwise
 DIAGONAL = 8  # neighbours up to the diagonal ones
@@ -94,12 +95,33 @@ def draw_particles(
     )
 
 
-def fit_squares(figure: Figure, drawn: Iterable[tuple[Axes, PathCollection]]) -> None:
-    """Give each panel's squares the side that makes neighbours touch, once the layout is known."""
+def draw_walls(axes: Axes, walls: np.ndarray | None) -> tuple[PathCollection, ...]:
+    """Grey squares where walls have their ghosts (G, 2) [m], and the limits round them; nothing
+    for None, and in three dimensions."""
+    if walls is None or walls.shape[1] != 2 or not len(walls):
+        return ()
+    margin = 0.5 * spacing(walls)
+    (left, bottom), (right, top) = walls.min(axis=0) - margin, walls.max(axis=0) + margin
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    axes.set(xlim=(min(left, x0), max(right, x1)), ylim=(min(bottom, y0), max(top, y1)))
+    squares = axes.scatter(
+        *walls.T, color=WALL, marker="s", linewidths=0, rasterized=True, zorder=0.5
+    )
+    return (squares,)
+
+
+def fit_squares(figure: Figure, drawn: Iterable[tuple[Any, ...]]) -> None:
+    """Give each panel's squares the side that makes neighbours touch, once the layout is known.
+
+    Args:
+        figure: laid out by this.
+        drawn: axes, the particles' squares, and others that are to be as large.
+    """
     figure.draw_without_rendering()
-    for axes, squares in drawn:
+    for axes, squares, *others in drawn:
         pixels = axes.get_window_extent().width
         extent = abs(axes.get_xlim()[1] - axes.get_xlim()[0])
         points = pixels * 72 / figure.dpi
         side = OVERLAP * spacing(np.asarray(squares.get_offsets())) * points / extent
-        squares.set_sizes([side**2])
+        for each in (squares, *others):
+            each.set_sizes([side**2])

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..trajectory import Snapshot
 from .fields import PRESSURE, VELOCITY, ParticleField
-from .particles import draw_particles, fit_squares, middle_layer
+from .particles import draw_particles, draw_walls, fit_squares, middle_layer
 from .style import INK, SMALL, TEXT, finite_range, sheet
 
 _PANEL = 4.0  # longer side of a panel [inch]
@@ -19,7 +19,10 @@ _BAR = 1.4  # room for a colour bar and labels [inch]
 
 
 def snapshot_figure(
-    time: float, snapshot: Snapshot, fields: Sequence[ParticleField] = (VELOCITY, PRESSURE)
+    time: float,
+    snapshot: Snapshot,
+    fields: Sequence[ParticleField] = (VELOCITY, PRESSURE),
+    walls: np.ndarray | None = None,
 ) -> Figure:
     """Particles coloured by fields, side by side; of three-dimensional ones the middle layer.
 
@@ -27,10 +30,12 @@ def snapshot_figure(
         time: of the snapshot [s].
         snapshot: positions (N, n) [m] and fields, as read from a file.
         fields: which ones to show.
+        walls: places of the walls' ghosts (G, n) [m], drawn grey in two dimensions.
     """
     shown = middle_layer(np.asarray(snapshot.position))
     position = np.asarray(snapshot.position)[shown, :2]
-    width, height = panel_size(position)
+    flat = walls is not None and walls.shape[1] == 2
+    width, height = panel_size(np.concatenate([position, walls]) if flat else position)
     figure = sheet(len(fields) * (width + _BAR), height + 0.8, "compressed")
     drawn = []
     for axes, field in zip(figure.subplots(1, len(fields), squeeze=False)[0], fields, strict=True):
@@ -39,7 +44,7 @@ def snapshot_figure(
         squares = draw_particles(axes, position, value, color_map, limits)
         label_panel(figure, axes, squares, field.label)
         axes.set_title(f"t = {time:.4g} s", fontsize=TEXT, color=INK)
-        drawn.append((axes, squares))
+        drawn.append((axes, squares, *draw_walls(axes, walls)))
     fit_squares(figure, drawn)
     return figure
 

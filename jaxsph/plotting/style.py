@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 
 INK = "#1a1a1a"
 FAINT = "#d9d9d9"
+WALL = "#9a9a9a"
 # Okabe and Ito (2008), without the yellow, which is too faint for lines on white.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 PURPLE, ORANGE, SKY = "#CC79A7", "#E69F00", "#56B4E9"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-from ..io import read_overview, read_snapshot
+from ..io import read_overview, read_snapshot, read_walls
 from ..plotting import history_figure, snapshot_figure
 from ..plotting.style import png
 from . import page
@@ -43,7 +43,7 @@ def write_run_report(
         pieces += [
             page.heading("Figures"),
             page.figure(
-                png(snapshot_figure(time, snapshot)),
+                png(snapshot_figure(time, snapshot, walls=read_walls(trajectory))),
                 f"Velocity norm and pressure at the last snapshot, t = {time:g} s{layer}.",
             ),
             page.figure(

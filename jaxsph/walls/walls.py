@@ -140,6 +140,14 @@ class Walls(eqx.Module):
         """Where fluid may be at t = 0, outside the bodies."""
         return _without(self.fluid_region, () if self.bodies is None else self.bodies.parts)
 
+    @property
+    def fixed_position(self) -> Float[np.ndarray, "ghosts dim"]:
+        """Places of the ghosts that are no part of a moving body [m]."""
+        position = np.asarray(self.position)
+        if self.bodies is None:
+            return position
+        return position[np.asarray(self.bodies.owner) == len(self.bodies.parts)]
+
     def at(self, time: Float[Array, ""]) -> Walls:
         """The walls at a time [s]: their bodies' ghosts moved, and their velocities."""
         if self.bodies is None:
