@@ -36,8 +36,8 @@ def animate(
     """Draw the particles of a trajectory file, coloured by a field, at all its times.
 
     Axes span the whole run and its walls, colours all but one percent of its values at either end.
-    The file is read twice, one snapshot at a time. The frames of a GIF are held in memory until its end, about
-    a megabyte each; those of an MP4 are not.
+    The file is read twice, one snapshot at a time. The frames of a GIF are held in memory until its
+    end, about a megabyte each; those of an MP4 are not.
 
     Args:
         source: the trajectory file.
