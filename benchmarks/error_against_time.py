@@ -168,9 +168,9 @@ class _Judge:
         flow, scene = trained.flow, self.scene
         first = jax.tree.map(lambda field: field[:1], self.run)
         start = flow.project(mapped_run(flow.reference, first, scene.fluid))
-        arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)
+        viscosity = 1.0 / scene.parameters["reynolds"]
         found, _, seconds = repeated(
-            lambda: flow.predict(start[0], *arguments, len(self.run.time) - 1), _REPEATS
+            lambda: flow.predict(start[0], viscosity, scene.schedule), _REPEATS
         )
         fields = flow.fields(jnp.concatenate([start, found]), self.run.time, self.line)
         profile = np.linalg.norm(fields.velocity, axis=2), fields.pressure
@@ -181,7 +181,7 @@ class _Judge:
 def _full_rows(options, folder: Path, judge: _Judge):
     """Full models of several resolutions, their snapshots at the same times."""
     finest = judge.scene.parameters["resolution"]
-    interval = judge.scene.time_step * judge.scene.steps_per_snapshot
+    interval = judge.scene.schedule.interval
     for share in SHARES:
         resolution = finest // share
         if share == 1:

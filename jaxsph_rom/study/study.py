@@ -140,7 +140,7 @@ class Study:
         for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
             scene = self.scene(reynolds)
             if reynolds in experiment.trained_on:
-                available += scene.steps // scene.steps_per_snapshot + 1
+                available += scene.schedule.intervals + 1
         for modes in experiment.modes:
             if not 1 <= modes <= available:
                 raise ValueError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -151,10 +152,6 @@ class _Project(NamedTuple):
         dynamics = self.reduction.dynamics(self.prepared, self.first, basis, runs)
         return ReducedFlow(self.reference, basis, dynamics, self.first.fluid), runs
 
-    @property
-    def steps(self) -> tuple[float, int]:
-        return self.first.time_step, self.first.steps_per_snapshot
-
 
 def train_each(
     make: Callable[..., Scene] | Family,
@@ -244,9 +241,8 @@ def _trained(
         flow, training.functionals[0], training.coefficients, training.names, training.points,
         law, Between.of(*between), _start_law(flow, training, starts),
         Between.of(training.points, starts), Indicator.of(flow, project.places, scale),
-        time_step=first.time_step, steps_per_snapshot=first.steps_per_snapshot,
-        snapshots=len(runs[0].coordinates) - 1, scene=first.name, parameters=first.parameters,
-        training=made, source=training,
+        schedule=replace(first.schedule, intervals=len(runs[0].coordinates) - 1), scene=first.name,
+        parameters=first.parameters, training=made, source=training,
     )  # fmt: skip
 
 
@@ -274,7 +270,7 @@ def _label(training: Training, k: int) -> str:
 def _check(training: Training, modes, closure: LinearClosure | None, runs) -> None:
     """A ValueError for what is known to fail before a full run."""
     first, count = training.scenes[0], len(training.scenes)
-    available = count * (1 + first.steps // first.steps_per_snapshot)
+    available = count * (1 + first.schedule.intervals)
     for wanted in modes:
         if isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
             raise ValueError(f"modes: a number from 1 on, got {wanted!r}.")
@@ -337,13 +333,13 @@ def _judged(flow: ReducedFlow, project: _Project, k: int, fields) -> dict[str, f
     """Error and residual of the reduced run at a training point."""
     start = flow.project(fields[..., 0])
     values = project.training.values[k]
-    time = project.steps[0] * project.steps[1] * np.arange(fields.shape[-1])
+    schedule = replace(project.first.schedule, intervals=fields.shape[-1] - 1)
     try:
-        after = flow.predict(start, values, *project.steps, len(time) - 1)
+        after = flow.predict(start, values, schedule)
     except SimulationError:
         return {"error": float("inf"), "residual": float("inf")}
     coordinates = np.concatenate([np.asarray(start)[None], after])
-    arguments = (jnp.asarray(a) for a in (values[None], time, coordinates[None]))
+    arguments = (jnp.asarray(a) for a in (values[None], schedule.times, coordinates[None]))
     residual = indicated(Indicator.of(flow, project.places, 1.0), flow, *arguments)
     error = velocity_error(flow, coordinates, fields[:, 1:])
     return {"error": error, "residual": float(residual[0])}

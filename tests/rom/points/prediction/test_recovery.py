@@ -120,7 +120,7 @@ def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
     np.testing.assert_allclose(found.pressure, everywhere.pressure[:, 3:90:10], atol=1e-6)
     model = TracerModel.of(trained.flow, jnp.asarray(1.0 / 70.0), scene.walls)
     start = TracerState(jnp.asarray(prediction.coordinates[0, 0]), jnp.asarray(some))
-    step = jnp.asarray(trained.time_step)
+    step = jnp.asarray(trained.schedule.time_step)
     run = eqx.filter_jit(lambda m, s: integrate(m, s, jnp.asarray(0), step, 10, 2))
     _, fault, seen, _ = run(model, start)
     assert int(fault.code) == 0 and np.isfinite(seen.pressure).all()
