@@ -49,7 +49,7 @@ def _arguments(add) -> None:
         help="points to be judged at (default: 20)")  # fmt: skip
     add("--out", type=Path, default=Path("out/families"), metavar="DIR",
         help="where models are kept (default: %(default)s)")  # fmt: skip
-    add("--page", type=Path, default=Path("docs/families.md"), metavar="FILE",
+    add("--page", type=Path, default=Path("docs/measured/families.md"), metavar="FILE",
         help="table as a page (default: %(default)s)")  # fmt: skip
 
 

@@ -93,6 +93,17 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
     assert not out.exists()
 
 
+def test_pressure_that_is_uniform_at_the_start_has_a_measure_and_a_verdict(tmp_path, capsys):
+    arguments = ["run", "shear-layer", "--resolution", "16", "--train", "100", "200", "--predict",
+                 "150", "--modes", "3", "--t-end", "0.1", "--hyper", "tensor",
+                 "--out", str(tmp_path)]  # fmt: skip
+    assert main(arguments) == 0
+    (case,) = json.loads((tmp_path / "report.json").read_text())["cases"]
+    assert case["stable"] and case["fault"] is None
+    for name in ("velocity", "pressure"):
+        assert 0.0 < case[f"{name}_median_percent"] <= case[f"{name}_peak_percent"] < 100.0
+
+
 def test_a_memory_length_is_a_time_or_a_rule():
     assert memory_length("1e-4") == 1e-4 and memory_length("auto") == SpectralMemory()
     assert memory_length("convective") == ConvectiveMemory()

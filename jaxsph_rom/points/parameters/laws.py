@@ -59,7 +59,7 @@ class Law(eqx.Module):
                 return None
             found = np.linalg.lstsq(features / size, values, rcond=1e-13)[0] / size[:, None]
             holds = left & (np.abs(features @ found - values).max(axis=0) <= allowed)
-            if holds.any():
+            if holds.any() or not len(left):  # a law of no numbers holds
                 forms.append(inverted)
                 weights.append(np.where(holds[:, None], found.T, 0.0))
                 left &= ~holds

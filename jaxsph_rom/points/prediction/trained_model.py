@@ -14,6 +14,8 @@ from jaxtyping import Array, Float
 
 from jaxsph import Fluid, ParticleState, Schedule, SPHFunctional, Trajectory
 from jaxsph.scenes import Scene
+from jaxsph.shown import concrete, line, spread
+from jaxsph.shown import table as shown_table
 
 from ..dynamics.coefficients import Coefficients
 from ..dynamics.log_density import to_log_density
@@ -94,13 +96,31 @@ class TrainedModel(eqx.Module):
     training: dict[str, Any] = eqx.field(static=True)
     source: Training | None = eqx.field(static=True, default=None)
 
-    def __repr__(self) -> str:
-        ranges = ", ".join(f"{n} {low:g} to {high:g}" for n, (low, high) in self.range.items())
-        size, runs = self.flow.basis.size, len(self.points)
-        return (
-            f"TrainedModel({self.scene}: {size} modes, {runs} runs over {ranges}, to "
-            f"t = {self.schedule.end_time:g} s)"
-        )
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.points, self.flow.basis.modes):
+            return None
+        told = self.training
+        kinds = [k for k in (told["formulation"], told["reduction"]) if k]
+        if told["closure"] != "none":
+            kinds.append(f"{told['closure']} closure")
+        errors = [r["errors"] for r in told["runs"] if isinstance(r["errors"], dict)]
+        percent = [e["velocity_median_percent"] for e in errors]
+        lost = len(told["runs"]) - len(errors)
+        return {
+            "scene": self.scene,
+            "runs": str(len(self.points)),
+            **{name: f"{low:g} to {high:g}" for name, (low, high) in self.range.items()},
+            "modes": f"{self.flow.basis.size} on {len(self.flow.reference.points)} points",
+            "made by": ", ".join(kinds),
+            "time": f"to {self.schedule.end_time:g} s",
+            "error on its runs": spread(percent, "%") + (f", {lost} lost" if lost else ""),
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return shown_table(self, self._rows())
 
     @property
     def range(self) -> dict[str, tuple[float, float]]:
@@ -168,10 +188,10 @@ class TrainedModel(eqx.Module):
         values = jnp.asarray(values, self.functional.mass.dtype)
         return self.coefficients.applied(self.functional, values).fluid
 
-    def indicate(self, values, time, coordinates) -> Float[Array, " members"]:
+    def indicate(self, points, values, time, coordinates) -> Float[Array, " members"]:
         """The expected error of each member (`Indicator`)."""
         dtype = self.flow.reference.points.dtype
-        arguments = (jnp.asarray(a, dtype) for a in (values, time, coordinates))
+        arguments = (jnp.asarray(a, dtype) for a in (points, values, time, coordinates))
         found = indicated(self.indicator, self.flow, *arguments)
         return found if _traced((values, coordinates)) else np.asarray(found)
 

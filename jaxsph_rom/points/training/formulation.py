@@ -40,9 +40,14 @@ class Formulation(abc.ABC):
 
     @abc.abstractmethod
     def basis(
-        self, scene: Scene, reference: ReferenceSpace, mapped: Sequence[np.ndarray], modes: int
+        self,
+        scene: Scene,
+        reference: ReferenceSpace,
+        mapped: Sequence[np.ndarray],
+        modes: int | None,
     ) -> Basis:
-        """Modes of (r, u); the first of them are those of fewer modes."""
+        """Modes of (r, u), as many as there are if no number is given; the first of them are those
+        of fewer modes."""
 
     @abc.abstractmethod
     def finished(

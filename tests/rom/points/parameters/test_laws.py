@@ -66,3 +66,9 @@ def test_a_function_of_the_host_is_differentiated_through(dtype, allowed):
     np.testing.assert_allclose(found, wanted, rtol=allowed, atol=allowed)
     several = jax.vmap(traced)(jnp.stack([point, 2.0 * point]))
     np.testing.assert_allclose(several[1], function(2.0 * np.asarray(point)), rtol=1e-6)
+
+
+def test_of_no_numbers_there_is_a_law():
+    points = np.array([[1.0], [2.0]])
+    law = Law.find(points, np.zeros((2, 0)))
+    assert law is not None and law(points[0]).shape == (0,)

@@ -108,6 +108,7 @@ def test_it_is_kept_in_a_file(cavity, tmp_path):
         a, b = (getattr(t.flow.recovery, name) for t in (trained, found))
         np.testing.assert_array_equal(a, b)
     assert trained.flow.truncated(2).recovery is None
+    assert eqx.tree_equal(found.functional.walls, trained.functional.walls)  # they keep tracers in
 
 
 def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
