@@ -35,10 +35,10 @@ from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.scenes import SCENES
 from jaxsph_rom import (
+    FAITHFUL,
     AdjointPetrovGalerkin,
     Experiment,
     Galerkin,
-    PaperAdvection,
     Study,
     cumulative_energy,
 )
@@ -152,7 +152,7 @@ def _settings(options) -> dict[str, Any]:
         "h_over_dx": options.h_over_dx,
         "end_time": options.end_time or end_time,
         "arrangement": options.arrangement or EXPERIMENTS[options.scene].arrangement,
-        "advection": PaperAdvection().name,
+        "advection": FAITHFUL.advection.name,
         "tau": plan.tau,
     }
     if plan.settling is not None:
@@ -235,8 +235,7 @@ def _study(options, plan: Plan, clocked: Clocked) -> Study:
     return Study(
         lambda reynolds: scene(reynolds=reynolds),
         folder,
-        product=PRODUCTS[options.inner_product](),
-        advection=PaperAdvection(),
+        method=dataclasses.replace(FAITHFUL, product=PRODUCTS[options.inner_product]()),
         progress=clocked.progress,
         probes=plan.probes,
         judged_from=plan.judged_from,
