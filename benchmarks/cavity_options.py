@@ -28,6 +28,7 @@ from jaxsph_rom import (
     Euclidean,
     Experiment,
     Galerkin,
+    Method,
     PaperAdvection,
     Study,
 )
@@ -74,11 +75,9 @@ def _rows(options):
             lambda reynolds: make(reynolds=reynolds),
             options.out,
             projections=(Galerkin(),),
-            product=inner_product,
-            advection=advection,
+            method=Method(inner_product, advection, rule),
             progress=clocked.progress,
             probes=plan.probes,
-            rule=rule,
         )
         experiment = Experiment((REYNOLDS,), (REYNOLDS,), (options.modes,))
         (outcome,) = study.run(experiment)

@@ -37,7 +37,8 @@ from jaxsph.plotting.style import (
     sheet,
 )  # fmt: skip
 from jaxsph.scenes import Scene
-from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
+from jaxsph_rom import FAITHFUL as PAPERS
+from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, Study
 from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
@@ -204,8 +205,7 @@ def _moving_rows(options, folder: Path, scenes: dict[float, Scene], judge: _Judg
             scenes.__getitem__,
             folder,
             projections=(Galerkin(),),
-            product=product(),
-            advection=PaperAdvection(),
+            method=dataclasses.replace(PAPERS, product=product()),
             progress=progress,
         )
         experiment = Experiment(tuple(options.train), (options.reynolds,), (modes,))

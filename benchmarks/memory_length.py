@@ -11,6 +11,7 @@ the same command goes on.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import (
+    FAITHFUL,
     AdjointPetrovGalerkin,
     ConvectiveMemory,
     Experiment,
@@ -82,7 +84,7 @@ def _run(options) -> None:
     for product in options.inner_product:
         study = Study(
             make, options.out or Path("out", "memory-length"),
-            product=PRODUCTS[product](), progress=progress,
+            method=replace(FAITHFUL, product=PRODUCTS[product]()), progress=progress,
         )  # fmt: skip
         for modes in options.modes:
             left = [name for name in rules if not kept.has((product, modes, name))]

@@ -30,10 +30,10 @@ from jaxsph.cli import (
 from jaxsph.environment import environment
 from jaxsph.scenes import SCENES
 from jaxsph_rom import (
+    FAITHFUL,
     AdjointPetrovGalerkin,
     Experiment,
     Galerkin,
-    PaperAdvection,
     Study,
     cumulative_energy,
 )
@@ -133,7 +133,7 @@ def _settings(options) -> dict[str, Any]:
         "h_over_dx": options.h_over_dx,
         "end_time": options.end_time or end_time,
         "arrangement": options.arrangement or EXPERIMENTS[options.scene].arrangement,
-        "advection": PaperAdvection().name,
+        "advection": FAITHFUL.advection.name,
         "tau": plan.tau,
     }
     if plan.settling is not None:
@@ -201,8 +201,7 @@ def _study(options, plan: Plan, clocked: Clocked) -> Study:
     return Study(
         lambda reynolds: scene(reynolds=reynolds),
         folder,
-        product=PRODUCTS[options.inner_product](),
-        advection=PaperAdvection(),
+        method=dataclasses.replace(FAITHFUL, product=PRODUCTS[options.inner_product]()),
         progress=clocked.progress,
         probes=plan.probes,
         judged_from=plan.judged_from,

@@ -15,7 +15,7 @@ import numpy as np
 from jaxsph import SimulationError, Trajectory
 from jaxsph.integrate import integrate
 from jaxsph.scenes import Scene
-from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Study
+from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Method, Study
 from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.cli.run import ADVECTIONS, INTERPOLATIONS, MAPS, MEMORIES
 from jaxsph_rom.points import (
@@ -107,12 +107,14 @@ def _moving(
         lambda reynolds: scenes.get(reynolds, scene),
         folder,
         projections=(_projection(setting, scene),),
-        product=PRODUCTS[setting.product](),
-        advection=ADVECTIONS[setting.advection](),
-        spline_order=setting.spline_order,
+        method=Method(
+            PRODUCTS[setting.product](),
+            ADVECTIONS[setting.advection](),
+            MAPS[setting.map],
+            INTERPOLATIONS[setting.interpolation],
+            setting.spline_order,
+        ),
         progress=bars.watched,
-        rule=MAPS[setting.map],
-        interpolation=INTERPOLATIONS[setting.interpolation],
     )
     for reynolds in (*case.trained_on, case.reynolds):
         study.full(reynolds)

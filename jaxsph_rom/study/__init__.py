@@ -1,6 +1,8 @@
 """Studies: train on full runs, predict, compare, report."""
 
 from .local_bases import LocalBases as LocalBases
+from .method import FAITHFUL as FAITHFUL
+from .method import Method as Method
 from .plans import PLANS as PLANS
 from .plans import Plan as Plan
 from .quiet_start import quiet as quiet

@@ -15,20 +15,17 @@ import numpy as np
 
 from jaxsph import SimulationError, Trajectory
 from jaxsph.content import digest
-from jaxsph.interpolation import KernelMap, ShepardMap
 from jaxsph.io import read_trajectory
 from jaxsph.kept_run import kept_run
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene
 
-from ..basis import Basis, Centring, Euclidean, InnerProduct, pod
-from ..field_advection import Advection, PaperAdvection
-from ..mode_interpolation import ModeInterpolation
+from ..basis import Basis, pod
 from ..model import ReducedModel, ReducedState
 from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projection
 from ..reference import ReferenceSpace, lagrangian_snapshots
 from ..report import Case
-from ..splines import LocalSplines
+from .method import Method
 from .recorded_run import Progress, full_run, with_record
 
 _UNIFORM = 1e-6  # of the largest spread over the probes that a field has at any time
@@ -92,16 +89,10 @@ class Study:
         folder: where trajectories are kept; a study that was cut short goes on from there.
         projections: to compare. A `MemoryLength` among them stands for the adjoint Petrov-Galerkin
             projection with the memory length that it finds for each run.
-        product: inner product of the POD and the projection; the paper's if none.
-        advection: how the Eulerian functional is made; the paper's if none.
-        spline_order: of the interpolation's splines or polynomials.
+        method: how the reduced models are made; `FAITHFUL` is the paper's.
         progress: opens a progress bar for each run.
         probes: where runs are compared, (P, n) [m] from a scene; the centre line if none is given.
         judged_from: time [s] from which on peaks and medians are taken.
-        centring: of the POD; the product's own if none.
-        rule: of the map to the reference points; the paper's if none.
-        interpolation: of the modes, from the reference points back to particles; the paper's
-            `LocalSplines` if none, `LatticePolynomials` where particles start on a lattice.
     """
 
     def __init__(
@@ -109,25 +100,16 @@ class Study:
         make: Callable[[float], Scene],
         folder: Path,
         projections: tuple[Projection | MemoryLength, ...] | None = None,
-        product: InnerProduct | None = None,
-        advection: Advection | None = None,
-        spline_order: int = 3,
+        method: Method = Method(),  # noqa: B008
         progress: Progress | None = None,
         probes: Callable[[Scene], np.ndarray] | None = None,
         judged_from: float = 0.0,
-        centring: Centring | None = None,
-        rule: type[KernelMap] = ShepardMap,
-        interpolation: type[ModeInterpolation] = LocalSplines,
     ):
         self.scene = cache(make)
         self.folder = Path(folder)
         self.projections = (Galerkin(),) if projections is None else projections
-        self.product = Euclidean() if product is None else product
-        self.centring = self.product.centring if centring is None else centring
-        self.advection = PaperAdvection() if advection is None else advection
-        self.spline_order = spline_order
+        self.method = method
         self.progress = silent if progress is None else progress
-        self.rule, self.interpolation = rule, interpolation
         self._probes = _centre_line if probes is None else probes
         self.judged_from = judged_from
         self.full = cache(self._full)
@@ -135,7 +117,8 @@ class Study:
         self.snapshots = cache(self._snapshots)
 
     def check(self, experiment: Experiment) -> None:
-        """A ValueError for more modes than snapshots, or an interpolation that does not fit."""
+        """A ValueError for more modes than snapshots, or an interpolation or advection that does
+        not fit."""
         available = 0
         for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
             scene = self.scene(reynolds)
@@ -150,7 +133,8 @@ class Study:
 
         scene = self.scene(experiment.trained_on[0])
         points = np.asarray(scene.state.position)
-        self.interpolation.check(points, scene.space, self.spline_order)
+        self.method.interpolation.check(points, scene.space, self.method.spline_order)
+        self.method.advection.eulerian(scene.effects)
 
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)
@@ -166,12 +150,12 @@ class Study:
     def reference(self, experiment: Experiment) -> ReferenceSpace:
         """The reference space: the initial configuration of the first training run."""
         scene = self.scene(experiment.trained_on[0])
-        return ReferenceSpace(scene.state.position, scene.space, self.rule)
+        return ReferenceSpace(scene.state.position, scene.space, self.method.rule)
 
     def _snapshots(self, reynolds: float, first: float) -> np.ndarray:
         """Mapped snapshots of a run on the reference space of the run at Re `first`."""
         scene = self.scene(first)
-        reference = ReferenceSpace(scene.state.position, scene.space, self.rule)
+        reference = ReferenceSpace(scene.state.position, scene.space, self.method.rule)
         return reference.snapshots(self.full(reynolds))
 
     def basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
@@ -179,13 +163,17 @@ class Study:
         first = experiment.trained_on[0]
         matrices = [self.snapshots(reynolds, first) for reynolds in experiment.trained_on]
         fluid = self.scene(first).fluid
-        return pod(np.concatenate(matrices, axis=-1), self.product, fluid, modes, self.centring)
+        return self._pod(matrices, fluid, modes)
 
     def lagrangian_basis(self, experiment: Experiment, modes: int | None = None) -> Basis:
         """POD basis of the training runs in Lagrangian space, for comparison."""
         runs = [lagrangian_snapshots(self.full(reynolds)) for reynolds in experiment.trained_on]
         fluid = self.scene(experiment.trained_on[0]).fluid
-        return pod(np.concatenate(runs, axis=-1), self.product, fluid, modes, self.centring)
+        return self._pod(runs, fluid, modes)
+
+    def _pod(self, matrices, fluid, modes: int | None) -> Basis:
+        together, method = np.concatenate(matrices, axis=-1), self.method
+        return pod(together, method.product, fluid, modes, method.centring)
 
     def run(self, experiment: Experiment) -> Iterator[Outcome]:
         """All reduced runs of an experiment, each compared with the full run."""
@@ -197,7 +185,8 @@ class Study:
         values = basis.functions.reshape(len(points), -1)
         numbers = np.arange(values.shape[1]).reshape(basis.modes.shape[1], -1)
         space = self.scene(experiment.trained_on[0]).space
-        interpolation = self.interpolation.fit(points, values, space, self.spline_order)
+        fit, order = self.method.interpolation.fit, self.method.spline_order
+        interpolation = fit(points, values, space, order)
         for modes in experiment.modes:
             part = basis.truncated(modes)
             kept = np.delete(numbers, np.s_[modes : basis.size], axis=1).reshape(-1)
@@ -206,27 +195,6 @@ class Study:
                     yield self._reduced(
                         experiment, reynolds, part, interpolation.select(kept), projection
                     )
-
-    @property
-    def _product_name(self) -> str:
-        """The inner product, and the centring if it is not the product's own."""
-        product, centring = type(self.product).__name__, type(self.centring).__name__
-        own = isinstance(self.centring, type(self.product.centring))
-        return product if own else f"{product}-{centring}"
-
-    @property
-    def _options(self) -> str:
-        """What reduced runs of other studies in this folder may differ in, but for the paper's."""
-        parts = [self._product_name.lower()]
-        if self.advection != PaperAdvection():
-            parts.append(self.advection.name)
-        if self.rule is not ShepardMap:
-            parts.append(self.rule.__name__.removesuffix("Map").lower())
-        if self.interpolation is not LocalSplines:
-            parts.append(self.interpolation.__name__.lower())
-        if self.spline_order != 3:
-            parts.append(f"order-{self.spline_order}")
-        return "-".join(parts)
 
     def _reduced(self, experiment, reynolds, basis, interpolation, projection) -> Outcome:
         scene = self.scene(reynolds)
@@ -245,11 +213,7 @@ class Study:
                 "modes": basis.size,
                 "projection": projection.name,
                 "tau": tau,
-                "inner_product": self._product_name,
-                "advection": self.advection.name,
-                "spline_order": self.spline_order,
-                "map": self.rule.__name__,
-                "interpolation": self.interpolation.__name__,
+                **self.method.record(),
             },
         )
 
@@ -258,7 +222,7 @@ class Study:
                 jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
             )
 
-        path = self.folder / "reduced" / f"{self._options}-{trained}" / f"re-{reynolds:g}"
+        path = self.folder / "reduced" / f"{self.method.label}-{trained}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
         label = f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}"
         fault = None
@@ -267,19 +231,15 @@ class Study:
                 path,
                 recorded,
                 lambda: ReducedModel.of_scene(
-                    scene, basis, interpolation, projection, self.advection
+                    scene, basis, interpolation, projection, self.method.advection
                 ),
                 lambda model: eqx.filter_jit(model.project)(scene.state),
                 restore,
                 lambda done: self.progress(label, scene.steps, done),
                 {
                     "training": [digest(self.scene(number)) for number in experiment.trained_on],
-                    "product": self.product,
-                    "centring": self.centring,
-                    "advection": self.advection,
+                    "method": self.method,
                     "projection": projection,
-                    "map": self.rule,
-                    "interpolation": self.interpolation,
                 },
             )
         except SimulationError as error:
@@ -288,7 +248,8 @@ class Study:
         return self._compare(experiment, reynolds, basis, projection, tau, memory, run, fault)
 
     def _petrov_galerkin(self, memory, scene, basis, interpolation) -> AdjointPetrovGalerkin:
-        model = ReducedModel.of_scene(scene, basis, interpolation, Galerkin(), self.advection)
+        advection = self.method.advection
+        model = ReducedModel.of_scene(scene, basis, interpolation, Galerkin(), advection)
         tau = memory(model, eqx.filter_jit(model.project)(scene.state))
         # rounded, so that a run that is taken up again finds the very number that it recorded
         return AdjointPetrovGalerkin(jnp.asarray(float(f"{tau:.4g}"), scene.state.density.dtype))
@@ -334,7 +295,7 @@ class Study:
         case = Case(
             scene=scene.name,
             reynolds=reynolds,
-            inner_product=self._product_name.lower(),
+            inner_product=self.method.product_name.lower(),
             velocity_peak_percent=float(percent[0][judged].max()),
             velocity_median_percent=float(np.median(percent[0][judged])),
             pressure_peak_percent=float(percent[1][judged].max()),

@@ -70,7 +70,7 @@ class TensorStudy:
         if self.formulation is not None:
             return self.formulation
         scene = self.study.scene(experiment.trained_on[0])
-        return formulation_for(scene, self.study.product, self.closed)
+        return formulation_for(scene, self.study.method.product, self.closed)
 
     def _closure(self, experiment: Experiment) -> LinearClosure:
         if self.judge is None:

@@ -72,9 +72,9 @@ def write_study(
         "judged_from": study.judged_from,
     }
     if any(outcome.made_of is None for outcome in outcomes):  # of models on moving particles
-        extra["advection"] = study.advection.name
-        extra["interpolation"] = study.interpolation.__name__
-        extra["spline_order"] = study.spline_order
+        extra["advection"] = study.method.advection.name
+        extra["interpolation"] = study.method.interpolation.__name__
+        extra["spline_order"] = study.method.spline_order
     history = discrepancy_history(
         [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
         folder / "discrepancy.png",

@@ -124,10 +124,10 @@ def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
     assert 0 < fixed["rom_seconds"] < moving["rom_seconds"]
     assert report["parameters"]["start"] == "balanced"
     own, points = report["bases"]
-    assert (own["model"], own["map"]) == ("moving particles", "ShepardMap")
+    assert (own["model"], own["map"]) == ("moving particles", "QuadraticMap")
     assert (points["model"], points["map"]) == ("tensor", "MovingLeastSquaresMap")
     assert own["cumulative_energy_percent"] != points["cumulative_energy_percent"]
-    assert report["map"] == "ShepardMap, MovingLeastSquaresMap" and report["spline_order"] == 3
+    assert report["map"] == "QuadraticMap, MovingLeastSquaresMap" and report["spline_order"] == 3
     assert {"modes_1.png", "modes_2.png"} <= {path.name for path in tmp_path.glob("*.png")}
     assert "hyper-reduction tensor" in capsys.readouterr().out
     assert (tmp_path / "fields_re_150.png").exists()

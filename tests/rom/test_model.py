@@ -48,6 +48,7 @@ def disturbed(scene):
 
 def reduced(scene, modes, projection, product=None, advection=None):
     product = Euclidean() if product is None else product
+    advection = PaperAdvection() if advection is None else advection
     dim, fluid = scene.space.box.dim, scene.fluid
     basis = Basis(
         modes,

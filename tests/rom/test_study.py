@@ -4,7 +4,7 @@ import numpy as np
 
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Energy, Experiment, MeanCentred, Study
+from jaxsph_rom import Experiment, MeanCentred, Method, Study
 from jaxsph_rom.study import study as study_module
 
 
@@ -14,11 +14,11 @@ def make(reynolds):
 
 def test_a_study_about_the_mean(tmp_path):
     experiment = Experiment((100.0,), (100.0,), (1, 2))
-    study = Study(make, tmp_path, product=Energy(), centring=MeanCentred())
+    study = Study(make, tmp_path, method=Method(centring=MeanCentred()))
     outcomes = list(study.run(experiment))
     assert [o.case.inner_product for o in outcomes] == ["energy-meancentred"] * 2
     folders = sorted(p.name for p in (tmp_path / "reduced").iterdir())
-    assert folders == ["energy-meancentred-100"]
+    assert folders == ["energy-meancentred-modes-quadratic-100"]
     state = make(100.0).state
     start = np.concatenate([state.density[:, None], state.velocity], axis=1)
     for outcome, modes in zip(outcomes, (1, 2), strict=True):
@@ -33,7 +33,7 @@ def test_a_study_about_the_mean(tmp_path):
         np.testing.assert_allclose(found.density[0], wanted[:, 0], atol=1e-8)
         np.testing.assert_allclose(found.velocity[0], wanted[:, 1:], atol=1e-9)
     assert basis.centre.shape == basis.modes.shape[:2]
-    own = Study(make, tmp_path, product=Energy()).basis(experiment, 2)
+    own = Study(make, tmp_path).basis(experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
 
 
