@@ -139,6 +139,11 @@ def train_each(
     progress: Progress | None = None,
 ) -> Iterator[TrainedModel]:
     """`train` for several numbers of modes; runs are made, mapped and decomposed once."""
+    kinds = {"closure": LinearClosure, "formulation": Formulation, "reduction": Reduction}
+    given = (closure, formulation, reduction)
+    for (name, kind), value in zip(kinds.items(), given, strict=True):
+        if value is not None and not isinstance(value, kind):
+            raise ValueError(f"{name}: an object of a {kind.__name__}, got {value!r}.")
     family = make if isinstance(make, Family) else Family(make)
     training = Training(family, parameters)
     first = training.scenes[0]

@@ -282,6 +282,12 @@ def test_the_first_snapshot_counts():
         jaxsph_rom.train(make, POINTS, modes=0)
     with pytest.raises(ValueError, match="parameters: two training points are the same"):
         jaxsph_rom.train(make, [POINTS[0], POINTS[0]], modes=2)
+    for name, value in (("closure", True), ("formulation", "solenoidal"),
+                        ("reduction", jaxsph_rom.Samples)):  # fmt: skip
+        with pytest.raises(ValueError, match=f"{name}: an object of a"):
+            jaxsph_rom.train(make, POINTS, modes=2, **{name: value})
+    with pytest.raises(ValueError, match="parameters: dictionaries of names and numbers, got 50"):
+        jaxsph_rom.train(make, 50.0, modes=2)
     with pytest.raises(ValueError, match="held_back: "):
         closure = jaxsph_rom.LinearClosure({"viscosity": 7.0, "force": 1.0})
         jaxsph_rom.train(make, POINTS, modes=2, closure=closure)
@@ -381,4 +387,4 @@ def test_a_family_may_differ_in_its_start_alone():
     assert prediction.start == "family" and not prediction.status.any()
     speed = np.linalg.norm(prediction.fields(1).velocity[0], axis=1).max()
     beside = np.linalg.norm(prediction.fields(0).velocity[0], axis=1).max()
-    assert speed / beside == pytest.approx(1.4, rel=1e-6)
+    assert speed / beside == pytest.approx(1.4, rel=0.01)  # within three modes
