@@ -9,6 +9,8 @@ from .quiet_start import quiet as quiet
 from .recorded_run import full_run as full_run
 from .recorded_run import with_record as with_record
 from .settled import settled as settled
+from .soundness import doubt as doubt
+from .soundness import level_and_fluctuation as level_and_fluctuation
 from .study import Experiment as Experiment
 from .study import Outcome as Outcome
 from .study import Study as Study

@@ -78,6 +78,7 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ),
         ([*SMALL, "--h-over-dx", "9"], "too small"),
         ([*SMALL, "--time-step", "1"], "stability limit"),
+        ([*SMALL, "--scheme", "consistent", "--advection", "paper"], "take ModeAdvection()"),
         ([*SMALL, "--tau", "x"], "--tau: a time in s, auto or convective, got 'x'"),
         ([*SMALL, "--tau", "-1"], "--tau: a time in s"),
         (["run", "taylor-green", "--scale", "vast"], "vast"),
@@ -102,6 +103,23 @@ def test_pressure_that_is_uniform_at_the_start_has_a_measure_and_a_verdict(tmp_p
     assert case["stable"] and case["fault"] is None
     for name in ("velocity", "pressure"):
         assert 0.0 < case[f"{name}_median_percent"] <= case[f"{name}_peak_percent"] < 100.0
+
+
+def test_the_papers_model_is_one_word_away(tmp_path):
+    arguments = ["run", "taylor-green", "--resolution", "12", "--t-end", "0.02", "--train", "100",
+                 "--predict", "100", "--modes", "2", "--arrangement", "lattice"]  # fmt: skip
+    choices = {}
+    for name, more in (("best", []), ("paper", ["--faithful"]),
+                       ("mixed", ["--faithful", "--map", "mls", "--gauge"])):  # fmt: skip
+        assert main([*arguments, *more, "--out", str(tmp_path / name)]) == 0
+        report = json.loads((tmp_path / name / "report.json").read_text())
+        (case,) = report["cases"]
+        choices[name] = case["inner_product"], report["advection"], report["map"]
+    assert choices == {
+        "best": ("energy", "modes", "QuadraticMap"),
+        "paper": ("euclidean", "paper", "ShepardMap"),
+        "mixed": ("euclidean", "paper-gauged", "MovingLeastSquaresMap"),
+    }
 
 
 def test_a_memory_length_is_a_time_or_a_rule():
