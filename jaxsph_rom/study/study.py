@@ -117,8 +117,8 @@ class Study:
         self.snapshots = cache(self._snapshots)
 
     def check(self, experiment: Experiment) -> None:
-        """A ValueError for more modes than snapshots, or an interpolation or advection that does
-        not fit."""
+        """A ValueError for more modes than snapshots, or an interpolation, advection or map
+        that does not fit."""
         available = 0
         for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
             scene = self.scene(reynolds)
@@ -135,6 +135,7 @@ class Study:
         points = np.asarray(scene.state.position)
         self.method.interpolation.check(points, scene.space, self.method.spline_order)
         self.method.advection.eulerian(scene.effects)
+        self.reference(experiment)
 
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)

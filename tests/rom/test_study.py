@@ -1,6 +1,7 @@
 """A study with a centre that varies: splines carry it, and runs of other centres stay apart."""
 
 import numpy as np
+import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
@@ -35,6 +36,13 @@ def test_a_study_about_the_mean(tmp_path):
     assert basis.centre.shape == basis.modes.shape[:2]
     own = Study(make, tmp_path).basis(experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
+
+
+def test_a_map_that_does_not_fit_is_met_before_a_run(tmp_path):
+    study = Study(lambda re: taylor_green(11, re, arrangement=Lattice(), end_time=0.05), tmp_path)
+    with pytest.raises(ValueError, match="three kernel supports"):
+        next(study.run(Experiment((100.0,), (100.0,), (1,))))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_field_that_is_uniform_at_the_start_has_a_discrepancy():
