@@ -115,8 +115,12 @@ class Prediction(eqx.Module):
             points: (P, n) [m]; the reference points if none are given.
 
         Raises:
-            ValueError: if the prediction is of a file and has no model.
+            ValueError: if there is no member of that number, or the prediction is of a file and has
+                no model.
         """
+        count = self.coordinates.shape[0]
+        if not -count <= member < count:
+            raise ValueError(f"member: {member}; the prediction has {count}, from 0 on.")
         return self._with_model().fields(self, member, points)
 
     def good(self, member: int) -> int:

@@ -114,6 +114,8 @@ def test_it_is_kept_in_a_file(cavity, tmp_path):
 def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
     trained, scene = cavity
     prediction = trained.predict({"reynolds": 70.0})
+    with pytest.raises(ValueError, match="member: 5; the prediction has 1"):
+        prediction.fields(5)
     everywhere = prediction.fields(0)
     some = np.asarray(trained.flow.reference.points)[3:90:10]
     found = prediction.fields(0, some)
