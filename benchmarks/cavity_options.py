@@ -27,8 +27,7 @@ from jaxsph_rom import (
     Energy,
     Euclidean,
     Experiment,
-    Galerkin,
-    Method,
+    OnParticles,
     PaperAdvection,
     Study,
 )
@@ -74,8 +73,7 @@ def _rows(options):
         study = Study(
             lambda reynolds: make(reynolds=reynolds),
             options.out,
-            projections=(Galerkin(),),
-            method=Method(inner_product, advection, rule),
+            OnParticles(product=inner_product, advection=advection, rule=rule),
             progress=clocked.progress,
             probes=plan.probes,
         )

@@ -38,7 +38,7 @@ from jaxsph.plotting.style import (
 )  # fmt: skip
 from jaxsph.scenes import Scene
 from jaxsph_rom import FAITHFUL as PAPERS
-from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, Study
+from jaxsph_rom import Energy, Euclidean, Experiment, Study
 from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
@@ -204,8 +204,7 @@ def _moving_rows(options, folder: Path, scenes: dict[float, Scene], judge: _Judg
         study = Study(
             scenes.__getitem__,
             folder,
-            projections=(Galerkin(),),
-            method=dataclasses.replace(PAPERS, product=product()),
+            dataclasses.replace(PAPERS, product=product()),
             progress=progress,
         )
         experiment = Experiment(tuple(options.train), (options.reynolds,), (modes,))

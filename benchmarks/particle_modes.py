@@ -24,7 +24,7 @@ from jaxsph.environment import environment
 from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import taylor_green
 from jaxsph.schemes import SCHEMES
-from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Study
+from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, OnParticles, Study
 from jaxsph_rom.study import doubt, level_and_fluctuation
 
 from .measure import format_rows, number, progress, tell
@@ -66,7 +66,6 @@ def _run(options) -> None:
     kept.results |= {"environment": environment(), "device": jax.devices()[0].device_kind}
     for scheme in options.schemes:
         for arrangement in options.arrangements:
-            study = _study(options, scheme, arrangement)
             truth = None
             for modes in options.modes:
                 left = [
@@ -77,7 +76,7 @@ def _run(options) -> None:
                 if not left:
                     tell(f"done before: {scheme}, {arrangement}, M = {modes}")
                     continue
-                study.projections = tuple(PROJECTIONS[name] for name in left)
+                study = _study(options, scheme, arrangement, left)
                 experiment = Experiment(tuple(options.train), (options.reynolds,), (modes,))
                 for outcome in study.run(experiment):
                     truth = truth or _Truth(study, experiment)
@@ -87,7 +86,7 @@ def _run(options) -> None:
     print(_table(kept.rows))
 
 
-def _study(options, scheme: str, arrangement: str) -> Study:
+def _study(options, scheme: str, arrangement: str, names: list[str]) -> Study:
     folder = options.out or Path("out", f"particle-modes-{options.resolution}")
 
     def make(reynolds: float):
@@ -100,7 +99,8 @@ def _study(options, scheme: str, arrangement: str) -> Study:
             dtype="float64",
         )
 
-    return Study(make, folder / f"{scheme}-{arrangement}", progress=progress)
+    method = OnParticles(tuple(PROJECTIONS[name] for name in names))
+    return Study(make, folder / f"{scheme}-{arrangement}", method, progress=progress)
 
 
 class _Truth:
@@ -108,9 +108,10 @@ class _Truth:
 
     def __init__(self, study: Study, experiment: Experiment):
         (self.reynolds,) = experiment.reynolds
-        self.scene, self.full = study.scene(self.reynolds), study.full(self.reynolds)
-        self.reference = study.reference(experiment)
-        self.basis = study.basis(experiment)
+        runs, (method,) = study.runs, study.methods
+        self.scene, self.full = runs.scene(self.reynolds), runs.full(self.reynolds)
+        self.reference = runs.reference(experiment.trained_on[0], method.rule)
+        self.basis = method.basis(runs, experiment)
         self.snapshots = self.reference.snapshots(self.full)
 
     def row(self, outcome, modes: int) -> dict[str, Any]:

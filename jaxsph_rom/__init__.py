@@ -52,5 +52,6 @@ from .splines import LocalSplines as LocalSplines
 from .study import FAITHFUL as FAITHFUL
 from .study import Experiment as Experiment
 from .study import LocalBases as LocalBases
-from .study import Method as Method
+from .study import OnParticles as OnParticles
+from .study import OnPoints as OnPoints
 from .study import Study as Study

@@ -18,7 +18,7 @@ from jaxsph import Schedule, SimulationError, Trajectory, simulate
 from jaxsph.integrate import FaultCode, Model
 from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.scenes import Scene
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 from .measures import Bound
 

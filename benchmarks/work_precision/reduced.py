@@ -15,7 +15,7 @@ import numpy as np
 from jaxsph import SimulationError, Trajectory
 from jaxsph.integrate import integrate
 from jaxsph.scenes import Scene
-from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Method, Study
+from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, OnParticles, Study
 from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.cli.run import ADVECTIONS, INTERPOLATIONS, MAPS, MEMORIES
 from jaxsph_rom.points import (
@@ -106,8 +106,8 @@ def _moving(
     study = Study(
         lambda reynolds: scenes.get(reynolds, scene),
         folder,
-        projections=(_projection(setting, scene),),
-        method=Method(
+        OnParticles(
+            (_projection(setting, scene),),
             PRODUCTS[setting.product](),
             ADVECTIONS[setting.advection](),
             MAPS[setting.map],
@@ -117,7 +117,7 @@ def _moving(
         progress=bars.watched,
     )
     for reynolds in (*case.trained_on, case.reynolds):
-        study.full(reynolds)
+        study.runs.full(reynolds)
     start = clock.perf_counter()
     (outcome,) = study.run(Experiment(case.trained_on, (case.reynolds,), (setting.modes,)))
     if outcome.case.fault is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
 
 import jax
@@ -28,7 +27,7 @@ from ..projection import (
 from ..report import format_table
 from ..splines import LocalSplines
 from ..still_walls import check_still
-from ..study import Method, Outcome, Plan, Study, TensorStudy, write_study
+from ..study import OnParticles, OnPoints, Plan, Study, write_study
 from .options import (
     PRODUCTS,
     add_closure_options,
@@ -137,16 +136,9 @@ def _run(options) -> int:
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         experiments = plan.experiments()
-        study, family = _study(options, plan, folder)
-        models = list(_models(options, study, family))
-        outcomes: list[Outcome] = []
+        study = _study(options, plan, folder)
         try:
-            for experiment in experiments:
-                for model in models:
-                    model.check(experiment)
-            for model in models:
-                for experiment in experiments:
-                    outcomes += model.run(experiment)
+            outcomes = list(study.run(*experiments))
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
@@ -157,18 +149,6 @@ def _run(options) -> int:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
     print(f"\nreport: {folder / 'report.html'}, {report}\nfigures: {folder}/*.png")
     return 0
-
-
-def _models(options, study: Study, family: Family) -> Iterator[Study | TensorStudy]:
-    """What runs reduced models: on moving particles, on reference points."""
-    closed = options.closure == "linear"
-    if closed and "tensor" not in options.hyper:
-        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
-    check_closure(options)
-    if "none" in options.hyper:
-        yield study
-    if "tensor" in options.hyper:
-        yield TensorStudy(study, formulation(options), closed, options.held_back, family)
 
 
 def _plan(options) -> Plan:
@@ -185,41 +165,49 @@ def _plan(options) -> Plan:
     return planned(options, ("train", "predict", "modes"), given)
 
 
-def _study(options, plan: Plan, folder: Path) -> tuple[Study, Family]:
-    reynolds = (*plan.train, *plan.predict)
-    memory = plan.tau if options.tau is None else options.tau
-    if not isinstance(memory, MemoryLength):
-        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
-    projections = {"galerkin": Galerkin(), "apg": memory}
-    interpolation = INTERPOLATIONS[options.interpolation]
-    advection = ADVECTIONS[options.advection]()
-    advection = Gauged(advection) if options.gauge else advection
+def _study(options, plan: Plan, folder: Path) -> Study:
+    closed = options.closure == "linear"
+    if closed and "tensor" not in options.hyper:
+        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
+    check_closure(options)
+    moving, experiments = _on_particles(options, plan), plan.experiments()
+    on_points, on_particles = "tensor" in options.hyper, "none" in options.hyper
 
     def check(scene: Scene) -> None:
-        interpolation.check(scene.state.position, scene.space, options.spline_order)
-        if moving:
+        moving.interpolation.check(scene.state.position, scene.space, options.spline_order)
+        if on_particles:
             check_still(scene)
-            advection.eulerian(scene.effects)
+            moving.advection.eulerian(scene.effects)
 
     def trained(family: Family) -> None:
-        for experiment in plan.experiments() if on_points else ():
+        for experiment in experiments if on_points else ():
             check_family(family, [{"reynolds": re} for re in experiment.trained_on])
 
-    on_points, moving = "tensor" in options.hyper, "none" in options.hyper
+    reynolds = (*plan.train, *plan.predict)
     family = scene_maker(options, plan, reynolds, folder, on_points, check, trained)
-    study = Study(
+    fixed = OnPoints(formulation(options), moving.product, closed, options.held_back, family)
+    methods = {"none": moving, "tensor": fixed}
+    return Study(
         family.make,
         folder,
-        projections=tuple(projections[name] for name in distinct(options.projection)),
-        method=Method(
-            PRODUCTS[options.inner_product](),
-            advection,
-            MAPS[options.map],
-            interpolation,
-            options.spline_order,
-        ),
+        *(methods[name] for name in methods if name in options.hyper),
         progress=bar,
         probes=plan.probes,
         judged_from=plan.judged_from,
     )
-    return study, family
+
+
+def _on_particles(options, plan: Plan) -> OnParticles:
+    memory = plan.tau if options.tau is None else options.tau
+    if not isinstance(memory, MemoryLength):
+        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
+    projections = {"galerkin": Galerkin(), "apg": memory}
+    advection = ADVECTIONS[options.advection]()
+    return OnParticles(
+        tuple(projections[name] for name in distinct(options.projection)),
+        PRODUCTS[options.inner_product](),
+        Gauged(advection) if options.gauge else advection,
+        MAPS[options.map],
+        INTERPOLATIONS[options.interpolation],
+        options.spline_order,
+    )

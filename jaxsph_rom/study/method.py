@@ -1,70 +1,83 @@
-"""How models on moving particles are made of full runs."""
+"""What a study compares: ways of making reduced models of full runs."""
 
 from __future__ import annotations
 
+import abc
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any
 
-from jaxsph.interpolation import KernelMap, QuadraticMap, ShepardMap
+import numpy as np
 
-from ..basis import Centring, Energy, Euclidean, InnerProduct
-from ..field_advection import Advection, ModeAdvection, PaperAdvection
-from ..mode_interpolation import ModeInterpolation
-from ..splines import LocalSplines
+from jaxsph import SimulationError, Trajectory
+
+from ..basis import Basis
+from ..reference import ReferenceSpace
+from .full_runs import FullRuns
 
 
-@final
 @dataclass(frozen=True)
-class Method:
-    """Choices of a model on moving particles; what measures best unless told otherwise.
+class Experiment:
+    """Reynolds numbers to train on, those to run the reduced model at, and numbers of modes.
 
-    Args:
-        product: inner product of the POD and the projection.
-        advection: how the Eulerian functional is made.
-        rule: of the map to the reference points.
-        interpolation: of the modes, from the reference points back to particles; besides
-            `LocalSplines` there is `LatticePolynomials`, where particles start on a lattice.
-        spline_order: of the interpolation's splines or polynomials.
-        centring: of the POD; the product's own if none is given.
+    A Reynolds number that is trained on is reconstructed, any other is predicted.
     """
 
-    product: InnerProduct = Energy()  # noqa: RUF009
-    advection: Advection = ModeAdvection()  # noqa: RUF009
-    rule: type[KernelMap] = QuadraticMap
-    interpolation: type[ModeInterpolation] = LocalSplines
-    spline_order: int = 3
-    centring: Centring | None = None
+    trained_on: tuple[float, ...]
+    reynolds: tuple[float, ...]
+    modes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ModelBasis:
+    """What reduced models are made of, for the report.
+
+    Args:
+        basis: of the models.
+        lagrangian: of the same runs in Lagrangian space.
+        reference: the points of the modes, and the map to them.
+        settings: choices that the report names.
+    """
+
+    basis: Basis
+    lagrangian: Basis
+    reference: ReferenceSpace
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ReducedRun:
+    """A reduced run, before it is judged.
+
+    Args:
+        reynolds: it is run at.
+        trajectory: as far as it came.
+        profile: velocity norm and pressure on the probes over time, each (S, P).
+        fault: that ended it, if any.
+        told: values of the report's `Case` that only the method knows.
+        made_of: tells what the model is made of.
+    """
+
+    reynolds: float
+    trajectory: Trajectory
+    profile: tuple[np.ndarray, np.ndarray]
+    fault: SimulationError | None
+    told: dict[str, Any]
+    made_of: Callable[[], ModelBasis]
+
+
+class Method(abc.ABC):
+    """A way of making reduced models of full runs, and of running them."""
 
     @property
+    @abc.abstractmethod
     def product_name(self) -> str:
-        """The inner product, and the centring if it is not the product's own."""
-        product, own = type(self.product).__name__, type(self.product.centring)
-        same = self.centring is None or isinstance(self.centring, own)
-        return product if same else f"{product}-{type(self.centring).__name__}"
+        """The inner product of the models, as reports name it."""
 
-    @property
-    def label(self) -> str:
-        """A name for folders: what differs from the paper's, and the product."""
-        parts = [self.product_name.lower()]
-        if self.advection != FAITHFUL.advection:
-            parts.append(self.advection.name)
-        if self.rule is not FAITHFUL.rule:
-            parts.append(self.rule.__name__.removesuffix("Map").lower())
-        if self.interpolation is not FAITHFUL.interpolation:
-            parts.append(self.interpolation.__name__.lower())
-        if self.spline_order != FAITHFUL.spline_order:
-            parts.append(f"order-{self.spline_order}")
-        return "-".join(parts)
+    @abc.abstractmethod
+    def check(self, runs: FullRuns, experiment: Experiment) -> None:
+        """A ValueError if the experiment cannot be done, before any run."""
 
-    def record(self) -> dict[str, Any]:
-        """The choices in words."""
-        return {
-            "inner_product": self.product_name,
-            "advection": self.advection.name,
-            "spline_order": self.spline_order,
-            "map": self.rule.__name__,
-            "interpolation": self.interpolation.__name__,
-        }
-
-
-FAITHFUL = Method(Euclidean(), PaperAdvection(), ShepardMap)  # the source paper's, as printed
+    @abc.abstractmethod
+    def run(self, runs: FullRuns, experiment: Experiment) -> Iterator[ReducedRun]:
+        """Train on the full runs, and run all of an experiment."""

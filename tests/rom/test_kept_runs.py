@@ -14,9 +14,9 @@ from jaxsph.arrangements import Lattice
 from jaxsph.effects import Gravity
 from jaxsph.io import TrajectoryFileError, TrajectoryWriter
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Energy, Experiment, Method, Study
+from jaxsph_rom import Energy, Experiment, OnParticles, Study
 from jaxsph_rom.study import full_run
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 EXPERIMENT = Experiment((100.0,), (100.0,), (2,))
 
@@ -65,7 +65,7 @@ def test_another_study_in_the_same_folder_is_refused(tmp_path):
     with pytest.raises(TrajectoryFileError, match="state.velocity"):
         list(Study(swirled, tmp_path).run(EXPERIMENT))
     with pytest.raises(TrajectoryFileError, match="made_by.method.product"):
-        list(Study(make, tmp_path, method=Method(product=Strong())).run(EXPERIMENT))
+        list(Study(make, tmp_path, OnParticles(product=Strong())).run(EXPERIMENT))
 
 
 def test_a_scene_without_a_reynolds_number_is_kept_by_its_content(tmp_path):

@@ -15,6 +15,7 @@ from jaxsph_rom import (
     Experiment,
     Galerkin,
     LocalSplines,
+    OnParticles,
     ReducedModel,
     ReducedState,
     SpectralMemory,
@@ -150,7 +151,7 @@ def test_a_study_tells_rules_apart_and_goes_on(tmp_path):
         return taylor_green(12, reynolds, arrangement=Lattice(), end_time=0.04, time_step=0.01)
 
     def study(*rules):
-        return [o.case for o in Study(make, tmp_path, rules).run(experiment)]
+        return [o.case for o in Study(make, tmp_path, OnParticles(rules)).run(experiment)]
 
     experiment = Experiment((100.0,), (100.0,), (2,))
     cases = study(AdjointPetrovGalerkin(1e-4), SpectralMemory(0.1))

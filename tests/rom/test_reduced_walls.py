@@ -19,7 +19,7 @@ from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, PaperAdvection, Re
 from jaxsph_rom.cli import main
 from jaxsph_rom.field_advection import FieldAdvection
 from jaxsph_rom.study import settled
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 ZERO = jnp.zeros(())
 

@@ -5,7 +5,7 @@ import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Experiment, MeanCentred, Method, Study
+from jaxsph_rom import Experiment, MeanCentred, OnParticles, Study
 from jaxsph_rom.study import study as study_module
 
 
@@ -15,7 +15,8 @@ def make(reynolds):
 
 def test_a_study_about_the_mean(tmp_path):
     experiment = Experiment((100.0,), (100.0,), (1, 2))
-    study = Study(make, tmp_path, method=Method(centring=MeanCentred()))
+    method = OnParticles(centring=MeanCentred())
+    study = Study(make, tmp_path, method)
     outcomes = list(study.run(experiment))
     assert [o.case.inner_product for o in outcomes] == ["energy-meancentred"] * 2
     folders = sorted(p.name for p in (tmp_path / "reduced").iterdir())
@@ -25,7 +26,7 @@ def test_a_study_about_the_mean(tmp_path):
     for outcome, modes in zip(outcomes, (1, 2), strict=True):
         assert outcome.case.stable
         # particles start on the reference points, where splines are exact and modes orthonormal
-        basis = study.basis(experiment, modes)
+        basis = method.basis(study.runs, experiment, modes)
         change = start - basis.centre
         coordinates = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, change)
         wanted = basis.centre + basis.modes @ coordinates
@@ -34,7 +35,7 @@ def test_a_study_about_the_mean(tmp_path):
         np.testing.assert_allclose(found.density[0], wanted[:, 0], atol=1e-8)
         np.testing.assert_allclose(found.velocity[0], wanted[:, 1:], atol=1e-9)
     assert basis.centre.shape == basis.modes.shape[:2]
-    own = Study(make, tmp_path).basis(experiment, 2)
+    own = OnParticles().basis(study.runs, experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
 
 
