@@ -135,8 +135,17 @@ def velocity_error(
     coordinates: Float[np.ndarray, "times modes"],
     velocity: Float[np.ndarray, "points dim times"],
 ) -> float:
-    """Root mean square over points and times of a run's error of velocity, relative to that of the
-    largest velocity field."""
+    """A reduced run's error of velocity over all points and times,
+
+        (<|u - u~|^2>)^(1/2) / max_t (<|u|^2>)^(1/2),
+
+    <> the mean over points, above over times as well.
+
+    Args:
+        flow: of the run.
+        coordinates: of the run, from its start on.
+        velocity: of the full run on the flow's reference points at the same times [m/s].
+    """
     found = np.asarray(flow.fields(jnp.asarray(coordinates), np.arange(len(coordinates))).velocity)
     wanted = np.moveaxis(velocity, -1, 0)
     largest = np.sqrt(np.mean(np.sum(wanted**2, axis=2), axis=1)).max(initial=0.0)
