@@ -27,7 +27,7 @@ from jaxsph_rom import (
     Energy,
     Euclidean,
     Experiment,
-    Galerkin,
+    OnParticles,
     PaperAdvection,
     Study,
 )
@@ -73,12 +73,9 @@ def _rows(options):
         study = Study(
             lambda reynolds: make(reynolds=reynolds),
             options.out,
-            projections=(Galerkin(),),
-            product=inner_product,
-            advection=advection,
+            OnParticles(product=inner_product, advection=advection, rule=rule),
             progress=clocked.progress,
             probes=plan.probes,
-            rule=rule,
         )
         experiment = Experiment((REYNOLDS,), (REYNOLDS,), (options.modes,))
         (outcome,) = study.run(experiment)

@@ -37,7 +37,8 @@ from jaxsph.plotting.style import (
     sheet,
 )  # fmt: skip
 from jaxsph.scenes import Scene
-from jaxsph_rom import Energy, Euclidean, Experiment, Galerkin, PaperAdvection, Study
+from jaxsph_rom import FAITHFUL as PAPERS
+from jaxsph_rom import Energy, Euclidean, Experiment, Study
 from jaxsph_rom.points import LinearClosure, TrainedModel, mapped_run, train_each
 from jaxsph_rom.study import full_run
 
@@ -168,9 +169,9 @@ class _Judge:
         flow, scene = trained.flow, self.scene
         first = jax.tree.map(lambda field: field[:1], self.run)
         start = flow.project(mapped_run(flow.reference, first, scene.fluid))
-        arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)
+        viscosity = 1.0 / scene.parameters["reynolds"]
         found, _, seconds = repeated(
-            lambda: flow.predict(start[0], *arguments, len(self.run.time) - 1), _REPEATS
+            lambda: flow.predict(start[0], viscosity, scene.schedule), _REPEATS
         )
         fields = flow.fields(jnp.concatenate([start, found]), self.run.time, self.line)
         profile = np.linalg.norm(fields.velocity, axis=2), fields.pressure
@@ -181,7 +182,7 @@ class _Judge:
 def _full_rows(options, folder: Path, judge: _Judge):
     """Full models of several resolutions, their snapshots at the same times."""
     finest = judge.scene.parameters["resolution"]
-    interval = judge.scene.time_step * judge.scene.steps_per_snapshot
+    interval = judge.scene.schedule.interval
     for share in SHARES:
         resolution = finest // share
         if share == 1:
@@ -203,9 +204,7 @@ def _moving_rows(options, folder: Path, scenes: dict[float, Scene], judge: _Judg
         study = Study(
             scenes.__getitem__,
             folder,
-            projections=(Galerkin(),),
-            product=product(),
-            advection=PaperAdvection(),
+            dataclasses.replace(PAPERS, product=product()),
             progress=progress,
         )
         experiment = Experiment(tuple(options.train), (options.reynolds,), (modes,))

@@ -49,7 +49,7 @@ def _arguments(add) -> None:
         help="points to be judged at (default: 20)")  # fmt: skip
     add("--out", type=Path, default=Path("out/families"), metavar="DIR",
         help="where models are kept (default: %(default)s)")  # fmt: skip
-    add("--page", type=Path, default=Path("docs/families.md"), metavar="FILE",
+    add("--page", type=Path, default=Path("docs/measured/families.md"), metavar="FILE",
         help="table as a page (default: %(default)s)")  # fmt: skip
 
 
@@ -206,7 +206,8 @@ median and the largest inside the range, the median outside; the floor is that o
 alone. The rank correlation is Spearman's, of the error that a prediction expects of itself
 (`error_indicator`) with its true one; beside it stands their ratio, its median and in brackets
 where the middle 80 % lie. Break-even is the number of full runs that training is worth, its own
-full runs, closure and compilation in it. Its times are of a shared machine.
+full runs, closure and compilation in it; its times are of a machine shared with other work, most
+of training is compilation there, and a full run takes a few seconds.
 
 {table}
 """

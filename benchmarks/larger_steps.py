@@ -205,9 +205,9 @@ class _Counted(eqx.Module):
     system: QuadraticSystem
     report: Callable = eqx.field(static=True)
 
-    def __call__(self, coordinates, viscosity):
+    def rates(self, time, coordinates, values):
         jax.debug.callback(self.report, coordinates[0])
-        return self.system(coordinates, viscosity)
+        return self.system.rates(time, coordinates, values)
 
 
 def _counted(run) -> Callable[..., int]:

@@ -11,6 +11,7 @@ the same command goes on.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import (
+    FAITHFUL,
     AdjointPetrovGalerkin,
     ConvectiveMemory,
     Experiment,
@@ -80,24 +82,23 @@ def _run(options) -> None:
         )
 
     for product in options.inner_product:
-        study = Study(
-            make, options.out or Path("out", "memory-length"),
-            product=PRODUCTS[product](), progress=progress,
-        )  # fmt: skip
         for modes in options.modes:
             left = [name for name in rules if not kept.has((product, modes, name))]
             if not left:
                 tell(f"done before: {product}, M = {modes}")
                 continue
-            study.projections = tuple(rules[name] for name in left)
+            projections = tuple(rules[name] for name in left)
+            method = replace(FAITHFUL, projections=projections, product=PRODUCTS[product]())
+            folder = options.out or Path("out", "memory-length")
+            study = Study(make, folder, method, progress=progress)
             experiment = Experiment((REYNOLDS,), (REYNOLDS,), (modes,))
             for name, outcome in zip(left, study.run(experiment), strict=True):
                 kept.rows.append(outcome.case.to_dict() | {"rule": name})
                 kept.rows.sort(key=lambda case: (case["inner_product"], case["modes"]))
                 kept.results |= {
                     "particles": outcome.trajectory.particles,
-                    "parameters": study.scene(REYNOLDS).parameters,
-                    "step": study.scene(REYNOLDS).time_step,
+                    "parameters": study.runs.scene(REYNOLDS).parameters,
+                    "step": study.runs.scene(REYNOLDS).time_step,
                     "device": jax.devices()[0].device_kind,
                     "environment": environment(),
                 }

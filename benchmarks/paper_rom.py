@@ -30,10 +30,10 @@ from jaxsph.cli import (
 from jaxsph.environment import environment
 from jaxsph.scenes import SCENES
 from jaxsph_rom import (
+    FAITHFUL,
     AdjointPetrovGalerkin,
     Experiment,
     Galerkin,
-    PaperAdvection,
     Study,
     cumulative_energy,
 )
@@ -133,7 +133,7 @@ def _settings(options) -> dict[str, Any]:
         "h_over_dx": options.h_over_dx,
         "end_time": options.end_time or end_time,
         "arrangement": options.arrangement or EXPERIMENTS[options.scene].arrangement,
-        "advection": PaperAdvection().name,
+        "advection": FAITHFUL.advection.name,
         "tau": plan.tau,
     }
     if plan.settling is not None:
@@ -158,10 +158,11 @@ def _run_kind(kept: Table, options, kind: Kind, wanted: list[Wanted]) -> None:
         return
     clocked = Clocked()
     plan = dataclasses.replace(PLANS[options.scene], borders=kind.borders)
-    study = _study(options, plan, clocked)
+    study = _study(options, plan, clocked, ())
     kept.results |= _scene_record(study, kind.trained_on[0]) | {"environment": environment()}
     for reynolds, modes, projections in _products(left):
-        study.projections = tuple(_projection(projection, plan.tau) for projection in projections)
+        wanted = tuple(_projection(projection, plan.tau) for projection in projections)
+        study = _study(options, plan, clocked, wanted)
         asked = dataclasses.replace(plan, train=kind.trained_on, predict=reynolds, modes=modes)
         for experiment in asked.experiments():
             for outcome in study.run(experiment):
@@ -184,7 +185,7 @@ def _place(case: dict[str, Any]) -> tuple:
     return case["inner_product"], kind, case["reynolds"], case["modes"], projection
 
 
-def _study(options, plan: Plan, clocked: Clocked) -> Study:
+def _study(options, plan: Plan, clocked: Clocked, projections) -> Study:
     folder = options.out or Path("out", f"paper-rom-{options.scene}-{options.scale}")
     settings = _settings(options)
     make = partial(
@@ -201,8 +202,9 @@ def _study(options, plan: Plan, clocked: Clocked) -> Study:
     return Study(
         lambda reynolds: scene(reynolds=reynolds),
         folder,
-        product=PRODUCTS[options.inner_product](),
-        advection=PaperAdvection(),
+        dataclasses.replace(
+            FAITHFUL, projections=projections, product=PRODUCTS[options.inner_product]()
+        ),
         progress=clocked.progress,
         probes=plan.probes,
         judged_from=plan.judged_from,
@@ -248,7 +250,7 @@ def _record(
 
 
 def _scene_record(study: Study, reynolds: float) -> dict[str, Any]:
-    scene = study.scene(reynolds)
+    scene = study.runs.scene(reynolds)
     particles = scene.state.position.shape[0]
     return {
         "particles": particles,
@@ -263,10 +265,14 @@ def _energies(
     study: Study, experiment: Experiment, paper: dict[str, dict[str, float]]
 ) -> dict[str, Any]:
     """Cumulative energy [%] at the paper's numbers of modes, in its spaces, and the paper's."""
-    bases = {"lagrangian": study.lagrangian_basis, "reference": study.basis}
+    (method,), trained_on = study.methods, experiment.trained_on
+    bases = {
+        "lagrangian": study.runs.lagrangian_basis(trained_on, method.product, modes=1),
+        "reference": method.basis(study.runs, experiment, 1),
+    }
     found: dict[str, Any] = {}
     for space, listed in paper.items():
-        energy = np.asarray(cumulative_energy(bases[space](experiment, 1).singular_values))
+        energy = np.asarray(cumulative_energy(bases[space].singular_values))
         found[space] = {m: float(energy[int(m) - 1]) for m in listed if int(m) <= len(energy)}
     return found | {"paper": paper}
 

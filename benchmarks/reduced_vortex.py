@@ -50,13 +50,12 @@ def profile_of(scene: Scene, run: Trajectory):
 
 def judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -> dict[str, Any]:
     """Errors on the centre line, the projection's own as a floor, and times."""
-    snapshots = len(run.time) - 1
-    arguments = (1.0 / scene.parameters["reynolds"], scene.time_step, scene.steps_per_snapshot)
+    viscosity = 1.0 / scene.parameters["reynolds"]
     first = jnp.asarray(projected[0])
     first_seconds, seconds, fault, found = None, [], None, None
     try:
         found, first_seconds, seconds = repeated(
-            lambda: flow.predict(first, *arguments, snapshots), _REPEATS
+            lambda: flow.predict(first, viscosity, scene.schedule), _REPEATS
         )
     except SimulationError as error:
         fault = str(error)

@@ -104,8 +104,7 @@ def _times(trained: TrainedModel, members: int) -> dict[str, Any]:
     for k in chosen:
         start = jnp.asarray(prediction.coordinates[k, 0])
         before = clock.perf_counter()
-        steps = trained.time_step, trained.steps_per_snapshot, trained.snapshots
-        found = trained.flow.predict(start, prediction.values[k], *steps)
+        found = trained.flow.predict(start, prediction.values[k], trained.schedule)
         found = np.asarray(found)
         alone.append(clock.perf_counter() - before)
         apart = np.abs(found - prediction.coordinates[k, 1:]).max() / np.abs(found).max()

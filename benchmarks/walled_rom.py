@@ -186,8 +186,7 @@ def _judged(
     flow = trained.flow
     on_points = truth.everywhere(trained, scene, run)
     projected = flow.project(truth.fields)
-    steps = scene.time_step, scene.steps_per_snapshot, len(run.time) - 1
-    arguments = (1.0 / scene.parameters["reynolds"], *steps)
+    arguments = 1.0 / scene.parameters["reynolds"], scene.schedule
     seconds, fault, found = [], None, None
     try:
         found, _, seconds = repeated(lambda: flow.predict(projected[0], *arguments), _REPEATS)

@@ -20,7 +20,8 @@ class Schedule:
         intervals: of the run; none for a start alone.
 
     Raises:
-        ValueError: if the steps in an interval are none, or the intervals negative.
+        ValueError: if the step is not above zero, the steps in an interval are none, or the
+            intervals negative.
 
     Examples:
         >>> from jaxsph import Schedule
@@ -34,6 +35,8 @@ class Schedule:
     intervals: int
 
     def __post_init__(self):
+        if not 0.0 < self.time_step < np.inf:
+            raise ValueError(f"time_step: above zero and finite, got {self.time_step:g} s.")
         for name, least in (("steps_per_snapshot", 1), ("intervals", 0)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name}: at least {least}, got {getattr(self, name)}.")

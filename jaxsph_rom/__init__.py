@@ -21,6 +21,8 @@ from .basis import pod as pod
 from .basis import projection_errors as projection_errors
 from .basis import streaming_pod as streaming_pod
 from .field_advection import ConsistentAdvection as ConsistentAdvection
+from .field_advection import Gauged as Gauged
+from .field_advection import ModeAdvection as ModeAdvection
 from .field_advection import PaperAdvection as PaperAdvection
 from .lattice_polynomials import LatticePolynomials as LatticePolynomials
 from .mode_interpolation import ModeInterpolation as ModeInterpolation
@@ -47,6 +49,9 @@ from .projection import SpectralMemory as SpectralMemory
 from .reference import ReferenceSpace as ReferenceSpace
 from .reference import lagrangian_snapshots as lagrangian_snapshots
 from .splines import LocalSplines as LocalSplines
+from .study import FAITHFUL as FAITHFUL
 from .study import Experiment as Experiment
 from .study import LocalBases as LocalBases
+from .study import OnParticles as OnParticles
+from .study import OnPoints as OnPoints
 from .study import Study as Study

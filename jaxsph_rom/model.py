@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
@@ -22,10 +23,10 @@ from jaxsph.integrate import Fault, FaultCode, Model
 from jaxsph.scenes import Scene
 
 from .basis import Basis
-from .field_advection import Advection, PaperAdvection
+from .field_advection import Advection, ModeAdvection
 from .mode_interpolation import ModeInterpolation
 from .projection import Projection, PseudoInverse
-from .still_walls import check_moving_particles
+from .still_walls import check_still
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
 
@@ -47,11 +48,12 @@ class ReducedModel(Model):
     so its cost is that of a full right-hand side and more.
 
     Args:
-        functional: f-bar, the Eulerian SPH functional.
+        functional: what of f-bar the effects make.
         projection: `Galerkin()` or `AdjointPetrovGalerkin(tau)`.
         interpolation: of `basis.functions`, ordered (field, function).
         basis: the modes at the reference points, with centre and inner product.
         search: neighbour search.
+        advection: how the Eulerian f-bar follows from the functional (static).
 
     Examples:
         >>> import numpy as np
@@ -79,6 +81,7 @@ class ReducedModel(Model):
     interpolation: ModeInterpolation
     basis: Basis
     search: NeighborSearch | WalledSearch
+    advection: Advection = eqx.field(static=True, default=ModeAdvection())
 
     @classmethod
     def of_scene(
@@ -92,18 +95,26 @@ class ReducedModel(Model):
     ) -> ReducedModel:
         """The reduced model of a scene; its parameters (viscosity and so on) are the scene's.
 
+        Args:
+            scene: whose effects, walls and steps the model has.
+            basis: the modes.
+            interpolation: of `basis.functions`.
+            projection: of the rates.
+            advection: how f-bar is made; `ModeAdvection()` if none is given.
+            margin: of the neighbour search's capacities; as of `Scene.search`.
+
         Raises:
-            ValueError: if the interpolation is not of `basis.functions`, or bodies are moved
-                through the fluid.
+            ValueError: if the interpolation is not of `basis.functions`, bodies are moved through
+                the fluid, or the advection does not suit the scene.
         """
-        check_moving_particles(scene)
+        check_still(scene)
         wanted, found = basis.functions[0].size, interpolation.functions
         if found != wanted:
             raise ValueError(
                 f"interpolation: of {found} functions, but the basis has {wanted}; fit them to "
                 "`basis.functions`."
             )
-        advection = PaperAdvection() if advection is None else advection
+        advection = ModeAdvection() if advection is None else advection
         functional = eqx.tree_at(
             lambda f: f.effects,
             scene.functional(),
@@ -118,7 +129,8 @@ class ReducedModel(Model):
                 for a in (basis.modes, basis.centre, basis.weights)
             ),
         )
-        return cls(functional, projection, interpolation, basis, scene.search(margin=margin))
+        search = scene.search(margin=margin)
+        return cls(functional, projection, interpolation, basis, search, advection)
 
     def basis_at(
         self, position: Array
@@ -153,21 +165,38 @@ class ReducedModel(Model):
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
     def stacked_rates(
-        self, time, stacked: Float[Array, " states"], position: Array, auxiliary
+        self,
+        time,
+        stacked: Float[Array, " states"],
+        position: Array,
+        auxiliary,
+        coordinates: Float[Array, " modes"],
     ) -> tuple[Float[Array, " states"], Float[Array, "particles dim"]]:
-        """f-bar of the stacked state (rho, u) at these positions, and dx/dt there."""
+        """f-bar of the stacked state (rho, u) at these positions, and dx/dt there.
+
+        Args:
+            coordinates: of the fields whose gradients carry, where these are the modes' own.
+        """
         fields = stacked.reshape(position.shape[0], -1)
         particles = ParticleState(position, fields[:, 1:], fields[:, 0])
         rates = self.functional(time, particles, auxiliary)
-        stacked = jnp.concatenate([rates.density[:, None], rates.velocity], axis=1)
-        return stacked.reshape(-1), rates.position
+        seen = jnp.concatenate([rates.density[:, None], rates.velocity], axis=1)
+
+        def carried():
+            fields = self.interpolation.combined(self.basis.combination(coordinates)[0])
+            return jax.jvp(fields, (position,), (rates.position,))[1]
+
+        found = self.advection.remaining(seen, particles.density, carried)
+        return found.reshape(-1), rates.position
 
     def rates(self, time, state, auxiliary):
         modes, centre = self.basis_at(state.position)
         stacked = (centre + modes @ state.coordinates).reshape(-1)
 
         def full_rates(stacked):
-            return self.stacked_rates(time, stacked, state.position, auxiliary)
+            return self.stacked_rates(
+                time, stacked, state.position, auxiliary, state.coordinates
+            )
 
         rates, transport = full_rates(stacked)
         coordinates = self.projection.reduce(

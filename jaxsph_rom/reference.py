@@ -23,8 +23,8 @@ class ReferenceSpace(eqx.Module):
     Args:
         points: (G, n) [m]; the initial or any relaxed configuration of particles.
         space: box, kernel, smoothing length of the full model.
-        rule: of G: `ShepardMap` (the paper's), or `MovingLeastSquaresMap`, which keeps linear
-            fields.
+        rule: of G: `ShepardMap` (the paper's), `MovingLeastSquaresMap`, which
+            keeps linear fields, or `QuadraticMap`, which keeps quadratic ones.
 
     Examples:
         >>> import jaxsph

@@ -7,7 +7,7 @@ import pytest
 
 from jaxsph import Box, Space
 from jaxsph.arrangements import JitteredLattice, Lattice
-from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
+from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
 from jaxsph.kernels import WendlandC2
 
 
@@ -63,13 +63,36 @@ def test_waves_on_a_lattice_are_mapped_at_second_order_as_shepards():
     np.testing.assert_allclose(ours, shepard, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("dim, side, h_over_dx", [(2, 16, 1.5), (2, 16, 4.0), (3, 9, 1.5)])
+def test_quadratic_fields_are_kept_next_to_walls_by_the_quadratic_map(dim, side, h_over_dx):
+    box = Box((0.0,) * dim, (1.0,) * dim, (False,) * dim)
+    space = Space(box, WendlandC2(), h_over_dx / side, 1.0 / side)
+    x = JitteredLattice(amplitude=0.3, seed=1).positions(space)
+    points = Lattice().positions(space)
+
+    def field(x):
+        return 3.0 + 2.0 * x[:, :1] - x[:, 1:2] ** 2 + x[:, :1] * x[:, -1:]
+
+    found = mapped(QuadraticMap, points, space, x, field(x))
+    np.testing.assert_allclose(found, field(points), rtol=0, atol=1e-10)
+
+
+def test_the_quadratic_map_smooths_waves_at_fourth_order():
+    errors = []
+    for side in (24, 48):
+        space = make_space(side)
+        x = Lattice().positions(space)
+        wave = jnp.sin(2.0 * jnp.pi * x[:, :1])
+        errors.append(np.abs(mapped(QuadraticMap, x, space, x, wave) - wave).max())
+    assert np.log2(errors[0] / errors[1]) > 3.8
+
+
 def test_a_point_with_too_few_particles_gets_shepards_value():
     space = make_space(16, periodic=False)
     x = jnp.asarray([[0.5, 0.5], [0.5, 0.5 + 1e-5]])  # no spread to fit a slope to
-    found = mapped(
-        MovingLeastSquaresMap, jnp.asarray([[0.55, 0.5]]), space, x, jnp.asarray([[1.0], [1.0]])
-    )
-    np.testing.assert_allclose(found, [[1.0]], rtol=1e-12)
+    for rule in (MovingLeastSquaresMap, QuadraticMap):
+        found = mapped(rule, jnp.asarray([[0.55, 0.5]]), space, x, jnp.asarray([[1.0], [1.0]]))
+        np.testing.assert_allclose(found, [[1.0]], rtol=1e-12)
 
 
 def test_gradients_in_values_and_places_are_finite():
@@ -86,7 +109,7 @@ def test_a_narrow_periodic_box_is_refused():
         MovingLeastSquaresMap.allocate(Lattice().positions(space), space)
 
 
-@pytest.mark.parametrize("rule", [ShepardMap, MovingLeastSquaresMap])
+@pytest.mark.parametrize("rule", [ShepardMap, MovingLeastSquaresMap, QuadraticMap])
 def test_maps_have_a_reverse_mode(rule):
     """Probes on a line leave cells partly filled, and one lies on a particle."""
     space = make_space(12, periodic=False)

@@ -14,14 +14,16 @@ CHECKS = {
     "03_reduced_model_and_its_errors": ("velocity_error", 0.02, "two modes; measured 0.005"),
     "04_stable_and_fast": ("velocity_error", 0.005, "five modes and closure; measured 0.002"),
     "05_inverse_problem_by_gradient": ("error", 0.03, "of the viscosity; measured 0.008"),
-    "06_a_scene_of_your_own": ("derivative_error", 1e-6, "against a difference; measured 2e-12"),
+    "06_a_scene_of_your_own": ("derivative_error", 1e-6, "against a difference; measured 6e-10"),
     "07_a_sweep_of_ten_thousand": ("velocity_error", 0.005, "at its peak; measured 0.0015"),
     "08_the_field_a_flow_started_from": ("error", 0.05, "of the field; measured 0.013"),
     "09_a_lid_for_a_wanted_line": ("left", 0.1, "of the first misfit; measured 0.027"),
     "10_memory_and_closure_learnt": ("ratio", 0.9, "of misfits, last to first; measured 0.79"),
     "11_optimise_on_the_reduced_model": ("error", 0.02, "of the viscosity; measured 0.005"),
+    "12_a_reduced_model_of_your_own": ("error", 0.01, "of velocity, median; measured 0.009"),
 }
-SLOW = (5, 8, 9, 10, 11)  # tests/benchmarks/test_inverse.py has these problems, at small size
+# tests/benchmarks/test_inverse.py and tests/rom/points/training have these problems, at small size
+SLOW = (5, 8, 9, 10, 11, 12)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,12 @@ def test_no_steps_are_refused(each, intervals, named):
         Schedule(0.1, each, intervals)
 
 
+@pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf")])
+def test_a_step_that_is_none_is_refused(step):
+    with pytest.raises(ValueError, match="time_step: above zero and finite"):
+        Schedule(step, 1, 1)
+
+
 def test_a_scene_runs_by_its_own_schedule():
     scene = taylor_green(16, arrangement=Lattice(), end_time=0.1)
     schedule = scene.schedule

@@ -35,7 +35,7 @@ from .bounds import (
     VORTEX,
     WALLS,
 )
-from .full_cases import interval
+from .full_cases import about
 from .judge import Case, Run
 
 _KICK = 0.02  # m/s, of U = 1 m/s
@@ -43,7 +43,7 @@ _KICK = 0.02  # m/s, of U = 1 m/s
 
 def _run(make: Callable[..., Scene], snapshots: int = 40, **settings) -> Run:
     scene = make(**{"dtype": "float64", **settings}, scheme=Consistent())
-    return Run(scene, interval(scene, snapshots))
+    return Run(scene, about(scene, snapshots))
 
 
 def _kicked(resolution: int, end_time: float) -> Run:
@@ -54,7 +54,7 @@ def _kicked(resolution: int, end_time: float) -> Run:
     )  # fmt: skip
     velocity = _KICK * jax.random.normal(jax.random.key(0), run.scene.state.velocity.shape)
     resting = eqx.tree_at(lambda s: s.walls.velocity, run.scene, 0.0 * run.scene.walls.velocity)
-    return Run(eqx.tree_at(lambda s: s.state.velocity, resting, velocity), run.steps_per_snapshot)
+    return Run(eqx.tree_at(lambda s: s.state.velocity, resting, velocity), run.schedule)
 
 
 def _case(name, what, bounds, make, slow=False, wrong="", **settings) -> Case:

@@ -16,7 +16,7 @@ from jaxsph.scenes import (
 from jaxsph.schemes import DeltaPlus
 
 from .bounds import LAYER, PATCH, POOL, PUSHED, SPLASH, TENSION_DROP, UNRESOLVED
-from .full_cases import interval
+from .full_cases import about
 from .judge import Case, Run
 
 
@@ -24,7 +24,7 @@ def _run(make, resolution: int, end_time: float, **more) -> Run:
     if make is not oscillating_drop:
         more = {"scheme": DeltaPlus(), **more}
     scene = make(resolution, end_time=end_time, dtype="float64", **more)
-    return Run(scene, interval(scene, 40))
+    return Run(scene, about(scene, 40))
 
 
 def _case(name, what, bounds, make, resolution, end_time, slow=False, wrong="", **more) -> Case:

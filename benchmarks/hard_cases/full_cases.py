@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from functools import partial
 
+from jaxsph import Schedule
 from jaxsph.arrangements import Arrangement, JitteredLattice, Lattice, Packed
 from jaxsph.effects import ArtificialViscosity, BackgroundPressure, Effect
 from jaxsph.integrate import FaultCode
@@ -35,7 +36,7 @@ def _vortex(
     scene = taylor_green(
         resolution, reynolds, end_time=end_time, arrangement=arrangement, dtype=precision
     )
-    return Run(scene, interval(scene, 50))
+    return Run(scene, about(scene, 50))
 
 
 def _evened(resolution: int, reynolds: float, end_time: float, arrangement: Arrangement) -> Run:
@@ -53,7 +54,7 @@ def _with_effect(run: Run, effect: Effect) -> Run:
 
 def _cavity(resolution: int, reynolds: float, end_time: float, precision: str) -> Run:
     scene = lid_driven_cavity(resolution, reynolds, end_time=end_time, dtype=precision)
-    return Run(scene, interval(scene, 50))
+    return Run(scene, about(scene, 50))
 
 
 def _damped_cavity(resolution: int, reynolds: float, end_time: float, precision: str) -> Run:
@@ -66,29 +67,34 @@ def _tank(resolution: int, end_time: float, precision: str) -> Run:
     scene = hydrostatic_tank(
         resolution, end_time=end_time, scheme=DeltaPlus(), dtype=precision
     )
-    return Run(scene, interval(scene, 50))
+    return Run(scene, about(scene, 50))
 
 
 def _open_cavity(resolution: int, end_time: float) -> Run:
     scene = open_cavity(resolution, end_time=end_time, dtype="float64")
-    return Run(scene, interval(scene, 200))
+    return Run(scene, about(scene, 200))
 
 
-def interval(scene: Scene, snapshots: int) -> int:
-    """Steps from one snapshot to the next for about so many snapshots."""
-    return max(1, scene.steps // snapshots)
+def about(scene: Scene, snapshots: int) -> Schedule:
+    """The scene's steps with about so many snapshots."""
+    return every(scene, max(1, scene.steps // snapshots))
+
+
+def every(scene: Scene, steps: int) -> Schedule:
+    """The scene's steps, rounded up to whole intervals of so many."""
+    return Schedule(scene.time_step, steps, -(-scene.steps // steps))
 
 
 def _courant_vortex(courant: float) -> Run:
     """A vortex whose scene is built with the step C h / c0."""
     scene = taylor_green(24, end_time=1.0, time_step=_step(2.0 / 24, courant), dtype="float64")
-    return Run(scene, 10)
+    return Run(scene, every(scene, 10))
 
 
 def _driven_beyond(scene: Scene, courant: float) -> Run:
     """A good scene driven by `simulate` with the step C h / c0, for 1 s."""
     step = _step(scene.space.smoothing_length, courant)
-    return Run(scene, 2, time_step=step, steps=round(1.0 / step))
+    return Run(scene, Schedule(step, 2, -(-round(1.0 / step) // 2)))
 
 
 def _step(smoothing_length: float, courant: float) -> float:

@@ -14,11 +14,11 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph import Schedule, SimulationError, Snapshot, Trajectory, simulate
+from jaxsph import Schedule, SimulationError, Trajectory, simulate
 from jaxsph.integrate import FaultCode, Model
 from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.scenes import Scene
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 from .measures import Bound
 
@@ -41,28 +41,17 @@ class Run:
 
     Args:
         scene: gives the state, and what figures are scaled by.
-        steps_per_snapshot: between snapshots.
+        schedule: its steps and snapshots.
         model: the scene's full model if none is given.
         start: the scene's state if none is given.
-        time_step: dt [s]; the scene's if none is given.
-        steps: the scene's if none are given; rounded up to whole snapshot intervals.
         predict: makes the trajectory in place of `simulate`, for models without particles.
     """
 
     scene: Scene
-    steps_per_snapshot: int
+    schedule: Schedule
     model: Model | None = None
     start: Any = None
-    time_step: float | None = None
-    steps: int | None = None
     predict: Callable[[], Trajectory] | None = None
-
-    @property
-    def schedule(self) -> Schedule:
-        """Its steps, in whole snapshot intervals."""
-        steps = self.scene.steps if self.steps is None else self.steps
-        time_step = self.scene.time_step if self.time_step is None else self.time_step
-        return Schedule(time_step, self.steps_per_snapshot, -(-steps // self.steps_per_snapshot))
 
 
 @dataclass(frozen=True)
@@ -198,9 +187,9 @@ def _simulated(run: Run, state, recorder: _Counted, report) -> Trajectory:
 
 def _hand_over(trajectory: Trajectory, run: Run, recorder: _Counted) -> None:
     """The snapshots of a trajectory, one by one."""
+    each = run.schedule.steps_per_snapshot
     for k, time in enumerate(trajectory.time):
-        fields = (trajectory.position, trajectory.velocity, trajectory.density, trajectory.pressure)
-        recorder.append(k * run.steps_per_snapshot, float(time), Snapshot(*(a[k] for a in fields)))
+        recorder.append(k * each, float(time), trajectory.snapshot(k))
 
 
 def all_finite(trajectory: Trajectory) -> bool:

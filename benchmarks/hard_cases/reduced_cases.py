@@ -100,7 +100,7 @@ def _model(basis: Basis, projection: Projection) -> ReducedModel:
 def _reduced(basis: Basis, projection: Projection) -> Run:
     scene, model = trained()[0], _model(basis, projection)
     start = eqx.filter_jit(model.project)(scene.state)
-    return Run(scene, scene.steps_per_snapshot, model, start)
+    return Run(scene, scene.schedule, model, start)
 
 
 def _every(snapshots: Snapshots) -> Snapshots:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 
 import equinox as eqx
@@ -37,16 +38,15 @@ def _predicted(modes: int | None, reynolds: float, change: Callable | None = Non
     flow, first = _flow()
     flow = flow if modes is None else flow.truncated(modes)
     flow = flow if change is None else change(flow)
-    every, count = scene.steps_per_snapshot, _TIMES_TRAINED * (len(run.time) - 1)
+    schedule = replace(scene.schedule, intervals=_TIMES_TRAINED * (len(run.time) - 1))
 
     def predict() -> Trajectory:
         start = flow.project(first)
         viscosity = jnp.asarray(1.0 / reynolds)
-        found = flow.predict(start, viscosity, scene.time_step, every, count)
-        time = scene.time_step * every * np.arange(count + 1)
-        return flow.fields(jnp.concatenate([start[None], found]), time)
+        found = flow.predict(start, viscosity, schedule)
+        return flow.fields(jnp.concatenate([start[None], found]), schedule.times)
 
-    return Run(scene, every, steps=count * every, predict=predict)
+    return Run(scene, schedule, predict=predict)
 
 
 def _quadratic_times(factor: float, flow: ReducedFlow) -> ReducedFlow:

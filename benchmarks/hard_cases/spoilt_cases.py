@@ -23,6 +23,7 @@ from .bounds import (
     SCATTERED,
     VORTEX,
 )
+from .full_cases import every
 from .judge import Case, Ending, Run
 
 RANDOM_PARTICLES = 64
@@ -31,7 +32,7 @@ _ANY = (Ending.FINISHED, Ending.FAULT)
 
 def _with(scene: Scene, position, velocity, density) -> Run:
     state = ParticleState(position, velocity, density)
-    return Run(dataclasses.replace(scene, state=state), 2)
+    return Run(dataclasses.replace(scene, state=state), every(scene, 2))
 
 
 def _vortex() -> Scene:

@@ -51,7 +51,7 @@ def run(
         jnp.zeros((), jnp.int32),
         jnp.asarray(scene.time_step, state.density.dtype),
         scene.steps_per_snapshot,
-        scene.steps // scene.steps_per_snapshot,
+        scene.schedule.intervals,
     )
     return snapshots, fault.code
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxsph import SimulationError, Trajectory
 from jaxsph.integrate import integrate
 from jaxsph.scenes import Scene
-from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, Study
+from jaxsph_rom import AdjointPetrovGalerkin, Experiment, Galerkin, OnParticles, Study
 from jaxsph_rom.cli import PRODUCTS
 from jaxsph_rom.cli.run import ADVECTIONS, INTERPOLATIONS, MAPS, MEMORIES
 from jaxsph_rom.points import (
@@ -106,16 +106,18 @@ def _moving(
     study = Study(
         lambda reynolds: scenes.get(reynolds, scene),
         folder,
-        projections=(_projection(setting, scene),),
-        product=PRODUCTS[setting.product](),
-        advection=ADVECTIONS[setting.advection](),
-        spline_order=setting.spline_order,
+        OnParticles(
+            (_projection(setting, scene),),
+            PRODUCTS[setting.product](),
+            ADVECTIONS[setting.advection](),
+            MAPS[setting.map],
+            INTERPOLATIONS[setting.interpolation],
+            setting.spline_order,
+        ),
         progress=bars.watched,
-        rule=MAPS[setting.map],
-        interpolation=INTERPOLATIONS[setting.interpolation],
     )
     for reynolds in (*case.trained_on, case.reynolds):
-        study.full(reynolds)
+        study.runs.full(reynolds)
     start = clock.perf_counter()
     (outcome,) = study.run(Experiment(case.trained_on, (case.reynolds,), (setting.modes,)))
     if outcome.case.fault is not None:
@@ -178,8 +180,7 @@ def _tensor(case: Case, setting, scene: Scene, scenes, runs) -> tuple[Trajectory
     trained = _trained(case, setting, scenes, runs)
     training = clock.perf_counter() - begin
     flow, start = trained.flow, _start(trained.flow, scene)
-    intervals = scene.steps // scene.steps_per_snapshot
-    steps = _viscosity(scene), scene.time_step, scene.steps_per_snapshot, intervals
+    steps = _viscosity(scene), scene.schedule
     found, first, seconds = repeated(lambda: flow.predict(start[0], *steps), _REPEATS)
     return _fields(flow, scene, start, found), {
         "run_seconds": summary(seconds),
@@ -222,8 +223,7 @@ def sampled(case: Case, setting, scene: Scene, scenes, runs) -> tuple[Trajectory
 
 def _integrated(model: PointsModel, coordinates, scene: Scene):
     step = jnp.asarray(scene.time_step, coordinates.dtype)
-    each, intervals = scene.steps_per_snapshot, scene.steps // scene.steps_per_snapshot
-    return _run(model, coordinates, step, each, intervals)
+    return _run(model, coordinates, step, scene.steps_per_snapshot, scene.schedule.intervals)
 
 
 @eqx.filter_jit
@@ -234,5 +234,4 @@ def _run(model, coordinates, step, each: int, intervals: int):
 def _fields(flow: ReducedFlow, scene: Scene, start, found) -> Trajectory:
     """On the reference points, at the times of snapshots."""
     coordinates = jnp.concatenate([start, jax.block_until_ready(found)])
-    interval = scene.time_step * scene.steps_per_snapshot
-    return flow.fields(coordinates, interval * np.arange(len(coordinates)))
+    return flow.fields(coordinates, scene.schedule.interval * np.arange(len(coordinates)))

@@ -47,7 +47,9 @@ def _show(options) -> int:
     print_rows({"file": f"{options.file}, {_size(overview.size)}", **_rows(overview, measures)})
     if options.json is not None:
         options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps({**vars(overview), **measures}, indent=2) + "\n")
+        shown = {**vars(overview), **vars(overview.schedule), "steps": overview.schedule.steps}
+        del shown["schedule"]
+        options.json.write_text(json.dumps({**shown, **measures}, indent=2) + "\n")
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 

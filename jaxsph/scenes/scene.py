@@ -74,7 +74,6 @@ class Scene(eqx.Module):
             self.solution = Solution.of(self, self.solution)
 
     def __check_init__(self):
-        schedule = self.schedule
         if self.walls is not None:
             beyond = np.asarray(self.walls.beyond(self.state.position))
             if beyond.any():
@@ -95,6 +94,7 @@ class Scene(eqx.Module):
                 "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
                 "wall, and the limits of other effects); choose one below it."
             )
+        schedule = self.schedule
         if abs(schedule.end_time - self.end_time) > 1e-6 * self.end_time:
             interval = self.steps_per_snapshot
             raise ValueError(

@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
 from jaxsph.scenes import SCENES, Scene
+from jaxsph.schemes import SCHEMES
 
 from ..basis import Energy, Euclidean
 from ..points import Compressible, Family, Formulation, Solenoidal
@@ -32,7 +33,8 @@ def add_training_options(add) -> None:
     add("--train", type=positive_float, nargs="+", metavar="RE",
         help=f"Reynolds numbers to train on ({defaults('train')})")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="energy",
-        help="of POD and projection (default: %(default)s; euclidean is the paper's)")  # fmt: skip
+        help="of POD and projection (default: energy; euclidean is the paper's)")  # fmt: skip
+    add("--scheme", choices=tuple(SCHEMES), help="of the full model (default: the scene's)")
     add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
     add("--resolution", type=positive_int, metavar="N", help="particles per longest side")
     add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
@@ -161,6 +163,8 @@ def scene_maker(
         "time_step": options.time_step,
         "dtype": options.precision,
     }
+    if options.scheme is not None:
+        settings["scheme"] = SCHEMES[options.scheme]
     if options.t_end is not None:
         settings["end_time"] = options.t_end
     plan.scenes(make, folder, bar)  # refuses to let what starts from rest settle

@@ -125,19 +125,19 @@ def _times(options, trained: TrainedModel) -> np.ndarray | None:
     """Whole snapshot intervals to the end that is asked for."""
     if options.t_end is None:
         return None
-    count = max(1, round(options.t_end / trained.interval))
-    nearest = count * trained.interval
+    count = max(1, round(options.t_end / trained.schedule.interval))
+    nearest = count * trained.schedule.interval
     if abs(nearest - options.t_end) > 1e-6 * nearest:
         raise ValueError(
             f"t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
-            f"{trained.interval:g} s; the nearest is {nearest:g} s."
+            f"{trained.schedule.interval:g} s; the nearest is {nearest:g} s."
         )
-    return trained.interval * np.arange(count + 1)
+    return trained.schedule.interval * np.arange(count + 1)
 
 
 def _check(options, trained: TrainedModel, points, times) -> None:
     """A ValueError for what asks too much."""
-    count, snapshots = len(points), trained.snapshots if times is None else len(times) - 1
+    count, snapshots = len(points), trained.schedule.intervals if times is None else len(times) - 1
     size = count * (snapshots + 1) * trained.flow.basis.size * points.itemsize
     if size > _MOST_BYTES:
         raise ValueError(
@@ -159,9 +159,9 @@ def _warn(trained: TrainedModel, prediction: Prediction) -> None:
         low, high = trained.range[name]
         print(f"jaxsph-rom: warning: {count} of {len(prediction)} {_title(name)} are outside "
               f"those trained on, {low:g} to {high:g}.", file=sys.stderr)  # fmt: skip
-    if prediction.time[-1] > trained.end_time * (1.0 + 1e-6):
+    if prediction.time[-1] > trained.schedule.end_time * (1.0 + 1e-6):
         print(f"jaxsph-rom: warning: t = {prediction.time[-1]:g} s is beyond the training "
-              f"runs, which end at {trained.end_time:g} s.", file=sys.stderr)  # fmt: skip
+              f"runs, which end at {trained.schedule.end_time:g} s.", file=sys.stderr)  # fmt: skip
     if prediction.operators == "interpolated":
         print("jaxsph-rom: warning: the operators at these parameters are interpolated between "
               "the training runs.", file=sys.stderr)  # fmt: skip
@@ -192,7 +192,7 @@ def _write_members(options, trained: TrainedModel, prediction: Prediction, folde
     points = np.asarray(trained.flow.reference.points)
     count = min(options.tracers, len(points))
     drawn = np.random.default_rng(options.seed).choice(len(points), count, replace=False)
-    steps = (len(prediction.time) - 1) * trained.steps_per_snapshot
+    steps = (len(prediction.time) - 1) * trained.schedule.steps_per_snapshot
     lost = ""
     for member, name in enumerate(names):
         label = f"tracers, {_said(prediction, member)}"
@@ -220,7 +220,7 @@ def _results(options, trained: TrainedModel, prediction: Prediction, path: Path)
         "operators": prediction.operators,
         "error_indicator_percent": _percent(prediction),
         "end_time": prediction.time[-1],
-        "steps": (len(prediction.time) - 1) * trained.steps_per_snapshot,
+        "steps": (len(prediction.time) - 1) * trained.schedule.steps_per_snapshot,
         "run_seconds": prediction.run_seconds,
         "compile_seconds": prediction.compile_seconds,
         "stable": len(prediction) - len(lost),
@@ -250,7 +250,7 @@ def _print(results: dict[str, Any], trained: TrainedModel, prediction: Predictio
         "model": f"{results['scene']}, M = {results['modes']}, {made['reduction']}, closure "
         f"{made['closure']}",
         "trained on": "; ".join(said(named) for named in reversed(made["trained_on"]))
-        + f", to t = {trained.end_time:g} s",
+        + f", to t = {trained.schedule.end_time:g} s",
     }
     for name, values in prediction.parameters.items():
         title = "Reynolds numbers" if name == "reynolds" else name

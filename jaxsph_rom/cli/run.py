@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
 
 import jax
 
 from jaxsph.cli import fail, positive_float, positive_int
 from jaxsph.integrate import SimulationError
-from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
+from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
 
-from ..field_advection import ConsistentAdvection, PaperAdvection
+from ..field_advection import ConsistentAdvection, Gauged, ModeAdvection, PaperAdvection
 from ..lattice_polynomials import LatticePolynomials
 from ..points import Family
 from ..points.training.training import check_family
@@ -27,7 +26,8 @@ from ..projection import (
 )
 from ..report import format_table
 from ..splines import LocalSplines
-from ..study import Outcome, Plan, Study, TensorStudy, write_study
+from ..still_walls import check_still
+from ..study import OnParticles, OnPoints, Plan, Study, write_study
 from .options import (
     PRODUCTS,
     add_closure_options,
@@ -42,9 +42,17 @@ from .options import (
     scene_maker,
 )
 
-MAPS = {"shepard": ShepardMap, "mls": MovingLeastSquaresMap}
+MAPS = {"shepard": ShepardMap, "mls": MovingLeastSquaresMap, "quadratic": QuadraticMap}
 INTERPOLATIONS = {"splines": LocalSplines, "polynomials": LatticePolynomials}
-ADVECTIONS = {"paper": PaperAdvection, "consistent": ConsistentAdvection}
+ADVECTIONS = {
+    "modes": ModeAdvection,
+    "paper": PaperAdvection,
+    "consistent": ConsistentAdvection,
+}
+BEST = {"inner_product": "energy", "advection": "modes", "map": "quadratic"}
+PAPERS = {
+    "scheme": "delta-plus", "inner_product": "euclidean", "advection": "paper", "map": "shepard"
+}  # fmt: skip
 PROJECTIONS = ("galerkin", "apg")
 HYPER = ("none", "tensor")
 MEMORIES = {rule.name: rule for rule in (SpectralMemory(), ConvectiveMemory())}
@@ -59,9 +67,9 @@ def add_to(commands) -> None:
         "numbers, and compare: a table of errors and times, figures, report.json and report.html. "
         "Runs are kept in the output folder: the same command goes on where it was cut short.",
     )
-    run.set_defaults(command=_run)
     add = run.add_argument
     add_training_options(add)
+    run.set_defaults(command=_run, inner_product=None)
     add("--predict", type=positive_float, nargs="+", metavar="RE",
         help=f"Reynolds numbers to run at ({defaults('predict')})")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", metavar="M",
@@ -79,11 +87,17 @@ def add_to(commands) -> None:
         help="memory length of apg [s], or a rule that finds it: 'auto' from the projected "
         "Jacobian's spectral radius, 'convective' from that of its convective part "
         f"({defaults('tau')})")  # fmt: skip
-    add("--advection", choices=tuple(ADVECTIONS), default="paper",
-        help="what is subtracted for the Eulerian functional (default: %(default)s)")  # fmt: skip
-    add("--map", choices=tuple(MAPS), default="shepard",
+    add("--faithful", action="store_true",
+        help="the source paper's model as printed, for whatever is not given: --scheme delta-plus "
+        "--inner-product euclidean --advection paper --map shepard")  # fmt: skip
+    add("--advection", choices=tuple(ADVECTIONS),
+        help="what is subtracted for the Eulerian functional: the modes' own advection, or sums "
+        "over the particles, of the delta-plus scheme (default: modes)")  # fmt: skip
+    add("--gauge", action="store_true",
+        help="hold the mean density, where the fluid fills its domain")
+    add("--map", choices=tuple(MAPS),
         help="of particles to reference points: Shepard's, or moving least squares, which keep "
-        "linear fields at walls (default: %(default)s)")  # fmt: skip
+        "linear (mls) or quadratic fields, at walls too (default: quadratic)")  # fmt: skip
     add("--interpolation", choices=tuple(INTERPOLATIONS), default="splines",
         help="of modes at moving particles: local polyharmonic splines, or polynomials where "
         "particles start on a lattice, which cost less (default: %(default)s)")  # fmt: skip
@@ -116,19 +130,15 @@ def _run(options) -> int:
     check_target(report)
     check_target(folder / "report.json")
     check_target(folder / "report.html")
+    for name, value in (PAPERS if options.faithful else BEST).items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         experiments = plan.experiments()
-        study, family = _study(options, plan, folder)
-        models = list(_models(options, study, family))
-        outcomes: list[Outcome] = []
+        study = _study(options, plan, folder)
         try:
-            for experiment in experiments:
-                for model in models:
-                    model.check(experiment)
-            for model in models:
-                for experiment in experiments:
-                    outcomes += model.run(experiment)
+            outcomes = list(study.run(*experiments))
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
@@ -139,18 +149,6 @@ def _run(options) -> int:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
     print(f"\nreport: {folder / 'report.html'}, {report}\nfigures: {folder}/*.png")
     return 0
-
-
-def _models(options, study: Study, family: Family) -> Iterator[Study | TensorStudy]:
-    """What runs reduced models: on moving particles, on reference points."""
-    closed = options.closure == "linear"
-    if closed and "tensor" not in options.hyper:
-        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
-    check_closure(options)
-    if "none" in options.hyper:
-        yield study
-    if "tensor" in options.hyper:
-        yield TensorStudy(study, formulation(options), closed, options.held_back, family)
 
 
 def _plan(options) -> Plan:
@@ -167,34 +165,49 @@ def _plan(options) -> Plan:
     return planned(options, ("train", "predict", "modes"), given)
 
 
-def _study(options, plan: Plan, folder: Path) -> tuple[Study, Family]:
-    reynolds = (*plan.train, *plan.predict)
-    memory = plan.tau if options.tau is None else options.tau
-    if not isinstance(memory, MemoryLength):
-        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
-    projections = {"galerkin": Galerkin(), "apg": memory}
-    interpolation = INTERPOLATIONS[options.interpolation]
+def _study(options, plan: Plan, folder: Path) -> Study:
+    closed = options.closure == "linear"
+    if closed and "tensor" not in options.hyper:
+        raise ValueError("--closure: models on moving particles have none; add --hyper tensor.")
+    check_closure(options)
+    moving, experiments = _on_particles(options, plan), plan.experiments()
+    on_points, on_particles = "tensor" in options.hyper, "none" in options.hyper
 
     def check(scene: Scene) -> None:
-        interpolation.check(scene.state.position, scene.space, options.spline_order)
+        moving.interpolation.check(scene.state.position, scene.space, options.spline_order)
+        if on_particles:
+            check_still(scene)
+            moving.advection.eulerian(scene.effects)
 
     def trained(family: Family) -> None:
-        for experiment in plan.experiments() if on_points else ():
+        for experiment in experiments if on_points else ():
             check_family(family, [{"reynolds": re} for re in experiment.trained_on])
 
-    on_points = "tensor" in options.hyper
+    reynolds = (*plan.train, *plan.predict)
     family = scene_maker(options, plan, reynolds, folder, on_points, check, trained)
-    study = Study(
+    fixed = OnPoints(formulation(options), moving.product, closed, options.held_back, family)
+    methods = {"none": moving, "tensor": fixed}
+    return Study(
         family.make,
         folder,
-        projections=tuple(projections[name] for name in distinct(options.projection)),
-        product=PRODUCTS[options.inner_product](),
-        advection=ADVECTIONS[options.advection](),
-        spline_order=options.spline_order,
-        rule=MAPS[options.map],
-        interpolation=interpolation,
+        *(methods[name] for name in methods if name in options.hyper),
         progress=bar,
         probes=plan.probes,
         judged_from=plan.judged_from,
     )
-    return study, family
+
+
+def _on_particles(options, plan: Plan) -> OnParticles:
+    memory = plan.tau if options.tau is None else options.tau
+    if not isinstance(memory, MemoryLength):
+        memory = AdjointPetrovGalerkin(jax.numpy.asarray(memory, options.precision))
+    projections = {"galerkin": Galerkin(), "apg": memory}
+    advection = ADVECTIONS[options.advection]()
+    return OnParticles(
+        tuple(projections[name] for name in distinct(options.projection)),
+        PRODUCTS[options.inner_product](),
+        Gauged(advection) if options.gauge else advection,
+        MAPS[options.map],
+        INTERPOLATIONS[options.interpolation],
+        options.spline_order,
+    )

@@ -154,7 +154,7 @@ def _results(trained: TrainedModel, path: Path) -> dict[str, Any]:
         "scene": trained.scene,
         "parameters": trained.parameters,
         "modes": trained.flow.basis.size,
-        "end_time": trained.end_time,
+        "end_time": trained.schedule.end_time,
         **trained.training,
         "model": path,
     }
@@ -168,7 +168,7 @@ def _print(trained: TrainedModel, particles: int, path: Path) -> None:
         closure += f", {made['closure_seconds']:.3g} s"
         closure += "" if judge is None else f", {said(judge)} held back"
     print_rows({
-        "scene": f"{trained.scene}, {particles} particles, to t = {trained.end_time:g} s",
+        "scene": f"{trained.scene}, {particles} particles, to t = {trained.schedule.end_time:g} s",
         "trained on": "; ".join(said(named) for named in reversed(made["trained_on"])),
         "modes": f"{trained.flow.basis.size}, {made['inner_product']} inner product, "
         f"{made['formulation']}",

@@ -39,6 +39,7 @@ from .prediction import TrainedModel as TrainedModel
 from .prediction import fit_recovery as fit_recovery
 from .prediction import mapped_run as mapped_run
 from .prediction import sweep as sweep
+from .prediction import velocity_error as velocity_error
 from .training import Compressible as Compressible
 from .training import FittedClosure as FittedClosure
 from .training import Formulation as Formulation

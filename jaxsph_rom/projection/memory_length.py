@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
 import equinox as eqx
@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..field_advection import advection_alone
+from ..field_advection import ModeAdvection
 from .spectral_radius import krylov_projection, spectral_radius
 
 if TYPE_CHECKING:
@@ -107,12 +107,8 @@ class ConvectiveMemory(MemoryLength):
         return "convective"
 
     def kept(self, model):
-        return eqx.tree_at(
-            lambda m: m.functional.effects,
-            model,
-            advection_alone(model.functional.effects),
-            is_leaf=lambda x: isinstance(x, tuple),
-        )
+        still = replace(model.functional, effects=())
+        return replace(model, functional=still, advection=ModeAdvection())
 
 
 def projected_jacobian(
@@ -131,7 +127,8 @@ def projected_jacobian(
 
     def rates(coordinates):
         stacked = (centre + modes @ coordinates).reshape(-1)
-        return inverse(model.stacked_rates(start, stacked, state.position, auxiliary)[0])
+        rates, _ = model.stacked_rates(start, stacked, state.position, auxiliary, coordinates)
+        return inverse(rates)
 
     return lambda direction: jax.jvp(rates, (state.coordinates,), (direction,))[1]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import final
 
-from .study import Experiment
+from .method import Experiment
 
 
 @final

@@ -13,9 +13,9 @@ from jaxsph.metrics import centre_line, vertical_slice
 from jaxsph.scenes import Scene
 
 from .local_bases import LocalBases
+from .method import Experiment
 from .recorded_run import Progress
 from .settled import settled
-from .study import Experiment
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,9 @@ from ..report import (
     write_html_report,
     write_report,
 )
-from .study import Experiment, ModelBasis, Outcome, Study
+from .full_runs import FullRuns
+from .method import Experiment, ModelBasis
+from .study import Outcome, Study
 
 _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
@@ -57,12 +59,15 @@ def write_study(
     folder.mkdir(parents=True, exist_ok=True)
     bases: list[dict[str, Any]] = []
     basis_figures: list[Shown] = []
-    made_of = [(e, basis) for e in experiments for basis in _made_of(study, e, outcomes)]
-    for number, (experiment, model) in enumerate(made_of):
-        suffix = f"_{number + 1}" if len(made_of) > 1 else ""
-        basis_figures += _basis_figures(study, experiment, model, folder, suffix)
-        bases.append(_basis_energies(study, experiment, model))
-    first = study.scene(experiments[0].trained_on[0])
+    shown_of = [outcome for e in experiments for outcome in _largest(e, outcomes)]
+    settings: dict[str, Any] = {}
+    for number, outcome in enumerate(shown_of):
+        suffix = f"_{number + 1}" if len(shown_of) > 1 else ""
+        model, case = outcome.made_of(), outcome.case
+        basis_figures += _basis_figures(study.runs, case, model, folder, suffix)
+        bases.append(_basis_energies(case, model))
+        settings |= model.settings
+    first = study.runs.scene(experiments[0].trained_on[0])
     if profile_time is None:
         profile_time = 0.5 * first.end_time
     extra = {
@@ -70,62 +75,53 @@ def write_study(
         "parameters": first.parameters,
         "map": ", ".join(dict.fromkeys(basis["map"] for basis in bases)),
         "judged_from": study.judged_from,
+        **settings,
     }
-    if any(outcome.made_of is None for outcome in outcomes):  # of models on moving particles
-        extra["advection"] = study.advection.name
-        extra["interpolation"] = study.interpolation.__name__
-        extra["spline_order"] = study.spline_order
     history = discrepancy_history(
         [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
         folder / "discrepancy.png",
     )
-    profiles = _profiles(study, outcomes, folder / "centre_line.png", profile_time)
+    profiles = _profiles(study.runs, outcomes, folder / "centre_line.png", profile_time)
     shown = [
         (history, "Relative discrepancy of each reduced run from its full model over time."),
         (profiles, "Velocity norm and pressure on the line that runs are compared on."),
     ]
     if first.space.box.dim == 2:
-        shown += _fields(study, outcomes, folder, profile_time)
+        shown += _fields(study.runs, outcomes, folder, profile_time)
     cases, made_on = [outcome.case for outcome in outcomes], environment()
     write_report(json_path or folder / "report.json", cases, made_on, extra)
-    settings = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
-    settings.pop("reynolds", None)  # each case has its own
-    write_html_report(folder / "report.html", cases, shown + basis_figures, settings, made_on)
+    told = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
+    told.pop("reynolds", None)  # each case has its own
+    write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on)
     return extra
 
 
-def _made_of(
-    study: Study, experiment: Experiment, outcomes: Sequence[Outcome]
-) -> list[ModelBasis]:
-    """The bases of an experiment's models: of each kind that with the most modes."""
-    found: dict[str, ModelBasis] = {}
+def _largest(experiment: Experiment, outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Of each kind of an experiment's models one with the most modes."""
+    found: dict[str, Outcome] = {}
     for outcome in outcomes:
-        if tuple(outcome.case.trained_on) != tuple(experiment.trained_on):
+        case = outcome.case
+        if tuple(case.trained_on) != tuple(experiment.trained_on):
             continue
-        model = outcome.made_of
-        if model is None:
-            if "" not in found:
-                basis, reference = study.basis(experiment), study.reference(experiment)
-                found[""] = ModelBasis("", outcome.case.trained_on, basis, reference)
-        elif model.model not in found or found[model.model].basis.size < model.basis.size:
-            found[model.model] = model
+        if case.hyper not in found or found[case.hyper].case.modes < case.modes:
+            found[case.hyper] = outcome
     return list(found.values())
 
 
 def _basis_figures(
-    study: Study, experiment: Experiment, model: ModelBasis, folder: Path, suffix: str
+    runs: FullRuns, case: Case, model: ModelBasis, folder: Path, suffix: str
 ) -> list[Shown]:
     """Singular values and modes of a model's basis."""
-    basis, lagrangian = model.basis, study.lagrangian_basis(experiment)
-    trained = f"of {model.model}, " if model.model else ""
-    trained += f"trained on Re {', '.join(f'{number:g}' for number in experiment.trained_on)}"
+    basis, lagrangian = model.basis, model.lagrangian
+    trained = "" if case.hyper == "none" else f"of {case.hyper}, "
+    trained += f"trained on Re {', '.join(f'{number:g}' for number in case.trained_on)}"
     decay = singular_values(
         lagrangian.singular_values, basis.singular_values, folder / f"singular_values{suffix}.png"
     )
     figures = [(decay, f"Singular values and cumulative energy of the basis {trained}.")]
     numbers = tuple(n for n in _SHOWN_MODES if n <= basis.size)
     points = np.asarray(model.reference.points)
-    start = study.full(experiment.trained_on[0]).position[0]
+    start = runs.full(case.trained_on[0]).position[0]
     if points.shape[1] == 2:
         shown = slice(max(numbers))
         shapes = modes(
@@ -140,16 +136,15 @@ def _basis_figures(
     return figures
 
 
-def _basis_energies(study: Study, experiment: Experiment, model: ModelBasis) -> dict[str, Any]:
+def _basis_energies(case: Case, model: ModelBasis) -> dict[str, Any]:
     """The cumulative energies of a model's basis [%]."""
-    lagrangian = study.lagrangian_basis(experiment)
     return {
-        "trained_on": list(experiment.trained_on),
-        "model": model.model or "moving particles",
+        "trained_on": list(case.trained_on),
+        "model": "moving particles" if case.hyper == "none" else case.hyper,
         "map": type(model.reference.map).__name__,
         "cumulative_energy_percent": {
             "reference": _listed(model.basis.singular_values),
-            "lagrangian": _listed(lagrangian.singular_values),
+            "lagrangian": _listed(model.lagrangian.singular_values),
         },
     }
 
@@ -176,14 +171,14 @@ def _by_reynolds(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
     return grouped
 
 
-def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float) -> Path:
+def _profiles(runs: FullRuns, outcomes: Sequence[Outcome], path: Path, time: float) -> Path:
     profiles = []
     several = len({o.case.modes for o in outcomes}) > 1
     for reynolds, group in _by_reynolds(outcomes).items():
-        scene, full = study.scene(reynolds), study.full(reynolds)
+        scene, full = runs.scene(reynolds), runs.full(reynolds)
         k = full.nearest(time)
-        line = study.probes(reynolds)
-        speed, pressure = study.profile(reynolds)
+        line = runs.probes(reynolds)
+        speed, pressure = runs.profile(reynolds)
         curves = {"full": (speed[k], pressure[k])}
         for outcome in group:
             if outcome.time[-1] < full.time[k]:
@@ -199,10 +194,10 @@ def _profiles(study: Study, outcomes: Sequence[Outcome], path: Path, time: float
     return centre_line_profiles(profiles, path)
 
 
-def _fields(study: Study, outcomes: Sequence[Outcome], folder: Path, time: float) -> list[Shown]:
+def _fields(runs: FullRuns, outcomes: Sequence[Outcome], folder: Path, time: float) -> list[Shown]:
     shown = []
     for reynolds, group in _by_reynolds(outcomes).items():
-        full = study.full(reynolds)
+        full = runs.full(reynolds)
         k = full.nearest(time)
         rows = [_row(f"full, Re {reynolds:g}", full, k)]
         for outcome in group:

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import larger_steps, memory_length
+from benchmarks import larger_steps, memory_length, particle_modes
 
 
 @pytest.fixture(autouse=True)
@@ -72,3 +72,23 @@ def test_larger_steps(tmp_path, capsys, monkeypatch):
     assert "all done before" in capsys.readouterr().err and results(path)["rows"] == rows
     assert larger_steps.main([*same, "--factors", "3"]) == 2
     assert "other settings" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_any_number_of_modes_on_particles_is_taken_up_again(tmp_path, capsys):
+    path = tmp_path / "modes.json"
+    same = ["--resolution", "16", "--end-time", "0.05", "--arrangements", "lattice"]
+    same += ["--json", str(path)]
+    assert particle_modes.main([*same, "--modes", "2"]) == 0
+    first = results(path)["rows"]
+    assert particle_modes.main([*same, "--modes", "2", "4", "--projections", "apg"]) == 0
+    rows = results(path)["rows"]
+    assert rows[:1] == first
+    made = [(r["modes"], r["projection"]) for r in rows]
+    assert made == [(2, "galerkin"), (2, "apg"), (4, "apg")]
+    for row in rows:
+        assert row["stable"] and row["doubt"] is None
+        assert 0 < row["floor_velocity_peak_percent"] < 1.0 and row["velocity_peak_percent"] < 1.0
+        assert 0 < row["level_peak_percent"] < row["fluctuation_peak_percent"] < 10.0
+    assert "apg" in capsys.readouterr().out
+    assert particle_modes.main([*same, "--reynolds", "150"]) == 2

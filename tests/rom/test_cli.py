@@ -78,6 +78,7 @@ def test_a_study_from_one_line(tmp_path, capsys):
         ),
         ([*SMALL, "--h-over-dx", "9"], "too small"),
         ([*SMALL, "--time-step", "1"], "stability limit"),
+        ([*SMALL, "--scheme", "consistent", "--advection", "paper"], "take ModeAdvection()"),
         ([*SMALL, "--tau", "x"], "--tau: a time in s, auto or convective, got 'x'"),
         ([*SMALL, "--tau", "-1"], "--tau: a time in s"),
         (["run", "taylor-green", "--scale", "vast"], "vast"),
@@ -91,6 +92,34 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and word in error
     assert not out.exists()
+
+
+def test_pressure_that_is_uniform_at_the_start_has_a_measure_and_a_verdict(tmp_path, capsys):
+    arguments = ["run", "shear-layer", "--resolution", "16", "--train", "100", "200", "--predict",
+                 "150", "--modes", "3", "--t-end", "0.1", "--hyper", "tensor",
+                 "--out", str(tmp_path)]  # fmt: skip
+    assert main(arguments) == 0
+    (case,) = json.loads((tmp_path / "report.json").read_text())["cases"]
+    assert case["stable"] and case["fault"] is None
+    for name in ("velocity", "pressure"):
+        assert 0.0 < case[f"{name}_median_percent"] <= case[f"{name}_peak_percent"] < 100.0
+
+
+def test_the_papers_model_is_one_word_away(tmp_path):
+    arguments = ["run", "taylor-green", "--resolution", "12", "--t-end", "0.02", "--train", "100",
+                 "--predict", "100", "--modes", "2", "--arrangement", "lattice"]  # fmt: skip
+    choices = {}
+    for name, more in (("best", []), ("paper", ["--faithful"]),
+                       ("mixed", ["--faithful", "--map", "mls", "--gauge"])):  # fmt: skip
+        assert main([*arguments, *more, "--out", str(tmp_path / name)]) == 0
+        report = json.loads((tmp_path / name / "report.json").read_text())
+        (case,) = report["cases"]
+        choices[name] = case["inner_product"], report["advection"], report["map"]
+    assert choices == {
+        "best": ("energy", "modes", "QuadraticMap"),
+        "paper": ("euclidean", "paper", "ShepardMap"),
+        "mixed": ("euclidean", "paper-gauged", "MovingLeastSquaresMap"),
+    }
 
 
 def test_a_memory_length_is_a_time_or_a_rule():
@@ -113,10 +142,10 @@ def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
     assert 0 < fixed["rom_seconds"] < moving["rom_seconds"]
     assert report["parameters"]["start"] == "balanced"
     own, points = report["bases"]
-    assert (own["model"], own["map"]) == ("moving particles", "ShepardMap")
+    assert (own["model"], own["map"]) == ("moving particles", "QuadraticMap")
     assert (points["model"], points["map"]) == ("tensor", "MovingLeastSquaresMap")
     assert own["cumulative_energy_percent"] != points["cumulative_energy_percent"]
-    assert report["map"] == "ShepardMap, MovingLeastSquaresMap" and report["spline_order"] == 3
+    assert report["map"] == "QuadraticMap, MovingLeastSquaresMap" and report["spline_order"] == 3
     assert {"modes_1.png", "modes_2.png"} <= {path.name for path in tmp_path.glob("*.png")}
     assert "hyper-reduction tensor" in capsys.readouterr().out
     assert (tmp_path / "fields_re_150.png").exists()

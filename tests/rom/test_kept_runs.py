@@ -14,9 +14,9 @@ from jaxsph.arrangements import Lattice
 from jaxsph.effects import Gravity
 from jaxsph.io import TrajectoryFileError, TrajectoryWriter
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Energy, Experiment, Study
+from jaxsph_rom import Energy, Experiment, OnParticles, Study
 from jaxsph_rom.study import full_run
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 EXPERIMENT = Experiment((100.0,), (100.0,), (2,))
 
@@ -61,11 +61,11 @@ def test_another_scene_in_the_same_folder_is_refused(tmp_path):
 
 
 def test_another_study_in_the_same_folder_is_refused(tmp_path):
-    list(Study(make, tmp_path, product=Energy()).run(EXPERIMENT))
+    list(Study(make, tmp_path).run(EXPERIMENT))
     with pytest.raises(TrajectoryFileError, match="state.velocity"):
-        list(Study(swirled, tmp_path, product=Energy()).run(EXPERIMENT))
-    with pytest.raises(TrajectoryFileError, match="made_by.product"):
-        list(Study(make, tmp_path, product=Strong()).run(EXPERIMENT))
+        list(Study(swirled, tmp_path).run(EXPERIMENT))
+    with pytest.raises(TrajectoryFileError, match="made_by.method.product"):
+        list(Study(make, tmp_path, OnParticles(product=Strong())).run(EXPERIMENT))
 
 
 def test_a_scene_without_a_reynolds_number_is_kept_by_its_content(tmp_path):

@@ -15,6 +15,7 @@ from jaxsph_rom import (
     Experiment,
     Galerkin,
     LocalSplines,
+    OnParticles,
     ReducedModel,
     ReducedState,
     SpectralMemory,
@@ -90,7 +91,7 @@ def test_sound_sets_the_spectral_length_and_the_flow_the_convective_one(vortex):
     assert flow > 3.0 * fast
 
 
-def test_walls_reach_the_convective_part():
+def test_the_convective_part_is_known_beside_walls():
     scene = lid_driven_cavity(12, 100.0)
     rng = np.random.default_rng(0)
     fields = rng.normal(size=(scene.state.position.shape[0], 3, 3)) * 0.1
@@ -98,7 +99,7 @@ def test_walls_reach_the_convective_part():
     model = reduced(scene, pod(fields, Energy(), scene.fluid, 3))
     state = ReducedState(jnp.asarray([0.3, -0.2, 0.1]), scene.state.position)
     kept = ConvectiveMemory().kept(model)
-    assert {e.name for e in kept.functional.effects} == {"FieldAdvection", "NoSlip", "WallPressure"}
+    assert not kept.functional.effects
     found = ConvectiveMemory()(model, state)
     assert found == pytest.approx(0.2 / spectral_radius(dense(kept, state)), rel=1e-5)
 
@@ -150,7 +151,7 @@ def test_a_study_tells_rules_apart_and_goes_on(tmp_path):
         return taylor_green(12, reynolds, arrangement=Lattice(), end_time=0.04, time_step=0.01)
 
     def study(*rules):
-        return [o.case for o in Study(make, tmp_path, rules, Energy()).run(experiment)]
+        return [o.case for o in Study(make, tmp_path, OnParticles(rules)).run(experiment)]
 
     experiment = Experiment((100.0,), (100.0,), (2,))
     cases = study(AdjointPetrovGalerkin(1e-4), SpectralMemory(0.1))

@@ -152,8 +152,9 @@ def test_petrov_galerkin_without_memory_is_galerkin(scene, disturbed):
 def test_memory_is_the_jacobian_on_the_unresolved_rates(scene, disturbed):
     """The memory term of apg against a central difference of f-bar, to 1e-6."""
     modes = some_modes(scene)
-    model = reduced(scene, modes, AdjointPetrovGalerkin(1.0), Energy())
-    plain = reduced(scene, modes, Galerkin(), Energy())
+    paper = PaperAdvection()
+    model = reduced(scene, modes, AdjointPetrovGalerkin(1.0), Energy(), paper)
+    plain = reduced(scene, modes, Galerkin(), Energy(), paper)
     state = eqx.filter_jit(model.project)(disturbed)
     memory = rates(model, state).coordinates - rates(plain, state).coordinates
 

@@ -44,7 +44,7 @@ def test_what_a_model_cost_and_gets_wrong(folder):
     assert read["parameters"]["arrangement"]["rule"] == "Stirred"
     trained = load(folder / "model.h5")
     assert trained.range == {"reynolds": (100.0, 250.0)}
-    assert trained.end_time == pytest.approx(0.05) and trained.scene == "taylor-green"
+    assert trained.schedule.end_time == pytest.approx(0.05) and trained.scene == "taylor-green"
 
 
 def test_a_sweep_from_one_line(folder, tmp_path, capsys):
@@ -60,7 +60,7 @@ def test_a_sweep_from_one_line(folder, tmp_path, capsys):
     numbers = found.parameters["reynolds"]
     assert not found.outside.any() and (found.error_indicator < 0.1).all()
     np.testing.assert_allclose(numbers, [110, 100, 125, 150, 175, 200, 225, 250])
-    assert found.coordinates.shape == (8, trained.snapshots + 1, 2)
+    assert found.coordinates.shape == (8, trained.schedule.intervals + 1, 2)
     np.testing.assert_array_equal(found.status, 0)
     # a vortex decays the faster, the lower its Reynolds number
     kept = np.sum(found.coordinates[1:, -1] ** 2, axis=1) / np.sum(
@@ -141,8 +141,8 @@ def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
     refused("holds no reduced flow")
     path.write_bytes(content)
     with h5py.File(path, "r+") as file:
-        file.attrs["schema_version"] = 4
-    refused("schema version 4")
+        file.attrs["schema_version"] = 5
+    refused("schema version 5")
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = 1
     refused("an earlier jaxsph_rom; make it anew")

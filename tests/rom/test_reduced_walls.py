@@ -19,7 +19,7 @@ from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, PaperAdvection, Re
 from jaxsph_rom.cli import main
 from jaxsph_rom.field_advection import FieldAdvection
 from jaxsph_rom.study import settled
-from jaxsph_rom.study.study import silent
+from jaxsph_rom.study.full_runs import silent
 
 ZERO = jnp.zeros(())
 
@@ -46,7 +46,7 @@ def test_a_full_basis_reproduces_the_full_models_rates_beside_walls(cavity):
     basis = full_basis(cavity)
     points = np.asarray(cavity.state.position)
     splines = LocalSplines.fit(points, basis.modes.reshape(len(points), -1), cavity.space, 3)
-    model = ReducedModel.of_scene(cavity, basis, splines, Galerkin())
+    model = ReducedModel.of_scene(cavity, basis, splines, Galerkin(), PaperAdvection())
     rng = np.random.default_rng(0)
     state = ParticleState(
         cavity.state.position,

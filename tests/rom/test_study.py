@@ -1,10 +1,11 @@
 """A study with a centre that varies: splines carry it, and runs of other centres stay apart."""
 
 import numpy as np
+import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Energy, Experiment, MeanCentred, Study
+from jaxsph_rom import Experiment, MeanCentred, OnParticles, Study
 from jaxsph_rom.study import study as study_module
 
 
@@ -14,17 +15,18 @@ def make(reynolds):
 
 def test_a_study_about_the_mean(tmp_path):
     experiment = Experiment((100.0,), (100.0,), (1, 2))
-    study = Study(make, tmp_path, product=Energy(), centring=MeanCentred())
+    method = OnParticles(centring=MeanCentred())
+    study = Study(make, tmp_path, method)
     outcomes = list(study.run(experiment))
     assert [o.case.inner_product for o in outcomes] == ["energy-meancentred"] * 2
     folders = sorted(p.name for p in (tmp_path / "reduced").iterdir())
-    assert folders == ["energy-meancentred-100"]
+    assert folders == ["energy-meancentred-modes-quadratic-100"]
     state = make(100.0).state
     start = np.concatenate([state.density[:, None], state.velocity], axis=1)
     for outcome, modes in zip(outcomes, (1, 2), strict=True):
         assert outcome.case.stable
         # particles start on the reference points, where splines are exact and modes orthonormal
-        basis = study.basis(experiment, modes)
+        basis = method.basis(study.runs, experiment, modes)
         change = start - basis.centre
         coordinates = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, change)
         wanted = basis.centre + basis.modes @ coordinates
@@ -33,8 +35,15 @@ def test_a_study_about_the_mean(tmp_path):
         np.testing.assert_allclose(found.density[0], wanted[:, 0], atol=1e-8)
         np.testing.assert_allclose(found.velocity[0], wanted[:, 1:], atol=1e-9)
     assert basis.centre.shape == basis.modes.shape[:2]
-    own = Study(make, tmp_path, product=Energy()).basis(experiment, 2)
+    own = OnParticles().basis(study.runs, experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
+
+
+def test_a_map_that_does_not_fit_is_met_before_a_run(tmp_path):
+    study = Study(lambda re: taylor_green(11, re, arrangement=Lattice(), end_time=0.05), tmp_path)
+    with pytest.raises(ValueError, match="three kernel supports"):
+        next(study.run(Experiment((100.0,), (100.0,), (1,))))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_field_that_is_uniform_at_the_start_has_a_discrepancy():

@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.hard_cases import measures
 from benchmarks.hard_cases.bounds import DENSITY, DISTANCE, LOOSE_DENSITY, WALLS
+from benchmarks.hard_cases.full_cases import every
 from benchmarks.hard_cases.judge import Case, Ending, Outcome, Run, all_finite, complaints, run_case
 from jaxsph import Trajectory
 from jaxsph.arrangements import Lattice
@@ -120,7 +121,7 @@ def test_complaints(scene):
 
 def test_a_case_ends_as_it_does(scene):
     """Its bounds are measured; a ValueError is a refusal, another error is never good."""
-    run = run_case(Case("a/b", "", lambda: Run(scene, 3), (LOOSE_DENSITY,)))
+    run = run_case(Case("a/b", "", lambda: Run(scene, every(scene, 3)), (LOOSE_DENSITY,)))
     assert run.ending is Ending.FINISHED and run.finite and run.steps % 3 == 0
     assert run.recorded == run.steps // 3 + 1
     assert LOOSE_DENSITY.kept(run.values["density"])

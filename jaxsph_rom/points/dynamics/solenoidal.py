@@ -12,6 +12,7 @@ from jaxtyping import Float
 from jaxsph import Fluid
 
 from ...basis import Basis
+from ...basis.pod import check_modes, check_snapshots, numerical_rank
 from .local_matrix import local_matrix
 from .reference_operators import ReferenceOperators
 
@@ -56,7 +57,7 @@ def without_divergence(
 def solenoidal_basis(
     snapshots: Float[np.ndarray, "points fields times"],
     operators: ReferenceOperators,
-    modes: int,
+    modes: int | None = None,
 ) -> Basis:
     """Velocity modes for a flow in which pressure only keeps the divergence zero.
 
@@ -69,25 +70,21 @@ def solenoidal_basis(
     Args:
         snapshots: (r, u) on the reference points (G, F, S).
         operators: of the scene on these points.
-        modes: how many.
+        modes: how many; as many as the numerical rank if none is given.
 
     Returns:
         a basis whose modes are zero in density. The first m modes are those of fewer modes.
 
     Raises:
-        ValueError: if there are fewer snapshots than modes, or a value is not finite.
+        ValueError: if the snapshots are none, in another order, all at rest, of a lower rank than
+            modes are asked for, or not finite.
     """
-    points, fields, times = snapshots.shape
-    count = min(points * (fields - 1), times)
-    if not 1 <= modes <= count:
-        raise ValueError(
-            f"modes: {modes} asked for, but {times} snapshots give 1 to {count}; ask for fewer "
-            "modes or record more snapshots."
-        )
+    points, fields, times = check_snapshots(snapshots)
     if not np.isfinite(snapshots).all():
         raise ValueError("snapshots: a value is not finite; the full model's run has failed.")
     velocity = snapshots[:, 1:].reshape(-1, times)
     left, sigma, _ = scipy.linalg.svd(velocity, full_matrices=False)
+    modes = check_modes(modes, numerical_rank(sigma, times, 0.0), times)
     raw = left[:, :modes].reshape(points, fields - 1, modes)
     clean = without_divergence(raw, divergence_matrix(operators)).reshape(-1, modes)
     orthonormal = np.linalg.qr(clean)[0].reshape(points, fields - 1, modes)

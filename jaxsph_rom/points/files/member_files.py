@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
@@ -44,7 +44,7 @@ def write_fields(
             snapshot = Snapshot(
                 *(getattr(fields, name)[k] for name in Snapshot.__dataclass_fields__)
             )
-            writer.append(k * trained.steps_per_snapshot, float(time), snapshot)
+            writer.append(k * trained.schedule.steps_per_snapshot, float(time), snapshot)
         if prediction.status[member] == 0:
             writer.finish()
 
@@ -98,4 +98,4 @@ def _created(path, trained, prediction, member, state) -> TrajectoryWriter:
 
 
 def _schedule(trained, prediction) -> Schedule:
-    return Schedule(trained.time_step, trained.steps_per_snapshot, len(prediction.time) - 1)
+    return replace(trained.schedule, intervals=len(prediction.time) - 1)

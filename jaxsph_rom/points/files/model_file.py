@@ -17,7 +17,7 @@ from ..prediction.trained_model import TrainedModel
 from .object_tree import read, write
 from .whole_file import FlowFileError, open_whole
 
-FORMAT, SCHEMA_VERSION = "jaxsph reduced flow", 3
+FORMAT, SCHEMA_VERSION = "jaxsph reduced flow", 4
 
 
 def save(path: str | os.PathLike, model: TrainedModel) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -186,6 +186,8 @@ def table(
             raise ValueError(f"parameters: give as many values of each, got {lengths}.")
         rows = [np.broadcast_to(column, count) for column in columns]
         return names, np.stack(rows, axis=1) if rows else np.zeros((0, 0))
+    if isinstance(parameters, str) or not isinstance(parameters, Iterable):
+        raise ValueError(f"parameters: dictionaries of names and numbers, got {parameters!r}.")
     members = list(parameters)
     if not members:
         raise ValueError("parameters: give at least one dictionary of them.")

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 _ROUND_OFF = 1e5  # times the precision
+_LOOSEST = 3e-4  # of the largest value, in any precision
 _MORE = 2  # points beyond the unknowns, at least: they test the law
 
 
@@ -46,26 +47,30 @@ class Law(eqx.Module):
         dtype = values.dtype
         values = np.asarray(values, float)
         scale = np.abs(values).max(axis=0, initial=0.0) if scale is None else scale
-        allowed = _ROUND_OFF * np.finfo(dtype).eps * scale
-        left = np.ones(values.shape[1], bool)
-        forms, weights = [], []
+        eps = np.finfo(dtype).eps
+        allowed = min(_ROUND_OFF * eps, _LOOSEST) * scale
+        varied = bool(np.ptp(values, axis=0).any())
+        forms, weights, errors = [], [], []
         for inverted in product((False, True), repeat=names):
             if any(i and (points[:, k] == 0.0).any() for k, i in enumerate(inverted)):
                 continue
             features = np.stack([np.asarray(_products(p, inverted)) for p in points])
+            if count < features.shape[1] + _MORE and varied:
+                return None
             size = np.abs(features).max(axis=0)
             size = np.where(size > 0.0, size, 1.0)
-            if count < features.shape[1] + _MORE and left.any() and np.ptp(values, axis=0).any():
-                return None
             found = np.linalg.lstsq(features / size, values, rcond=1e-13)[0] / size[:, None]
-            holds = left & (np.abs(features @ found - values).max(axis=0) <= allowed)
-            if holds.any():
-                forms.append(inverted)
-                weights.append(np.where(holds[:, None], found.T, 0.0))
-                left &= ~holds
-            if not left.any():
-                return cls(jnp.asarray(np.stack(weights), dtype), tuple(forms))
-        return None
+            forms.append(inverted)
+            weights.append(found.T)
+            errors.append(np.abs(features @ found - values).max(axis=0))
+        # of forms that do as well the first, or 1 / Re would pass for a parabola within a tolerance
+        good = errors <= 4.0 * np.min(errors, axis=0) + 64.0 * eps * scale
+        chosen = np.argmax(good, axis=0)
+        if not (np.take_along_axis(np.asarray(errors), chosen[None], 0)[0] <= allowed).all():
+            return None
+        used = [k for k in range(len(forms)) if (chosen == k).any()] or [0]
+        kept = [np.where((chosen == k)[:, None], weights[k], 0.0) for k in used]
+        return cls(jnp.asarray(np.stack(kept), dtype), tuple(forms[k] for k in used))
 
     def __call__(self, point: Float[Array, " names"]) -> Float[Array, " values"]:
         point = jnp.asarray(point, self.weights.dtype)

@@ -1,6 +1,7 @@
 """A trained model, what it predicts, and how far to trust that."""
 
 from .indicator import Indicator as Indicator
+from .indicator import velocity_error as velocity_error
 from .prediction import Prediction as Prediction
 from .recovery import Recovery as Recovery
 from .recovery import fit_recovery as fit_recovery

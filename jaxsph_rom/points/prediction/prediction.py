@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxsph import Trajectory
+from jaxsph.shown import concrete, line, spread, table
 
 if TYPE_CHECKING:
     from .trained_model import TrainedModel
@@ -65,13 +66,28 @@ class Prediction(eqx.Module):
     def __len__(self) -> int:
         return len(self.points)
 
-    def __repr__(self) -> str:
-        what = ", ".join(self.names)
-        count, size = self.coordinates.shape[0], self.coordinates.shape[2]
-        return (
-            f"Prediction({count} members over {what}; {size} modes at {len(self.time)} times; "
-            f"start {self.start})"
-        )
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.points, self.coordinates, self.status, self.outside):
+            return None
+        count, times, size = self.coordinates.shape
+        rows = {"members": str(count)}
+        rows |= {name: spread(values, "").rstrip() for name, values in self.parameters.items()}
+        rows |= {
+            "coordinates": f"{size} at {times} times, {spread(self.time, 's')}",
+            "start": self.start,
+            "outside": str(int(np.sum(self.outside))),
+            "lost": str(int(np.sum(np.asarray(self.status) != 0))),
+        }
+        known = self.__dict__.get("_indicated", self.indicated)  # not worked out to be shown
+        if known is not None and concrete(known):
+            rows["expected error"] = spread(100.0 * np.asarray(known), "%")
+        return rows
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return table(self, self._rows())
 
     @property
     def parameters(self) -> dict[str, Float[Array, " members"]]:
@@ -88,7 +104,8 @@ class Prediction(eqx.Module):
     def _indicated(self):
         if self.indicated is not None:
             return self.indicated
-        return self._with_model().indicate(self.values, self.time, self.coordinates)
+        model = self._with_model()
+        return model.indicate(self.points, self.values, self.time, self.coordinates)
 
     def fields(self, member: int = 0, points=None) -> Trajectory:
         """Fields of a member over time, as far as it is good.
@@ -98,8 +115,12 @@ class Prediction(eqx.Module):
             points: (P, n) [m]; the reference points if none are given.
 
         Raises:
-            ValueError: if the prediction is of a file and has no model.
+            ValueError: if there is no member of that number, or the prediction is of a file and has
+                no model.
         """
+        count = self.coordinates.shape[0]
+        if not -count <= member < count:
+            raise ValueError(f"member: {member}; the prediction has {count}, from 0 on.")
         return self._with_model().fields(self, member, points)
 
     def good(self, member: int) -> int:

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsph import Fluid, Trajectory
-from jaxsph.integrate import SimulationError, integrate
+from jaxsph import Fluid, Schedule, Trajectory
+from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import KernelMap, MovingLeastSquaresMap
 from jaxsph.scenes import Scene
 
@@ -28,6 +28,7 @@ from ..dynamics.log_density import from_log_density, to_log_density
 from ..dynamics.points_model import PointsModel
 from ..dynamics.quadratic_system import galerkin_system
 from .recovery import Recovery
+from .times import EvenTimes
 
 
 class ReducedFlow(eqx.Module):
@@ -51,7 +52,7 @@ class ReducedFlow(eqx.Module):
         >>> flow = ReducedFlow.train(scene, [run], scene.state.position, modes=2)
         >>> start = flow.project(mapped_run(flow.reference, run, scene.fluid))[0]
         >>> viscosity = jnp.asarray(1.0 / 150.0)  # Re = 150; the run was at 100
-        >>> coordinates = flow.predict(start, viscosity, scene.time_step, 2, snapshots=3)
+        >>> coordinates = flow.predict(start, viscosity, scene.schedule)
         >>> fields = flow.fields(coordinates, run.time[1:])
         >>> fields.velocity.shape  # snapshots, points, directions
         (3, 256, 2)
@@ -130,9 +131,7 @@ class ReducedFlow(eqx.Module):
         self,
         coordinates: Float[Array, " modes"],
         values: Float[Array, "*coefficients"],
-        time_step: float,
-        steps_per_snapshot: int,
-        snapshots: int,
+        schedule: Schedule,
     ) -> Float[Array, "snapshots modes"]:
         """Coordinates after each interval, by the full model's loop.
 
@@ -140,10 +139,9 @@ class ReducedFlow(eqx.Module):
             SimulationError: if they are not finite or leave the bound on energy; it names the step.
         """
         model = self.model(jnp.asarray(values, coordinates.dtype))
-        step = jnp.asarray(time_step, coordinates.dtype)
-        _, fault, found, _ = _integrated(model, coordinates, step, steps_per_snapshot, snapshots)
+        found, fault, _ = _run(EvenTimes.of(schedule, coordinates.dtype), model, coordinates)
         if int(fault.code) != 0:
-            raise SimulationError(fault, time_step)
+            raise SimulationError(fault, schedule.time_step)
         return found
 
     def fields(
@@ -215,9 +213,8 @@ class ReducedFlow(eqx.Module):
 
 
 @eqx.filter_jit
-def _integrated(model, coordinates, time_step, steps_per_snapshot, snapshots):
-    first = jnp.zeros((), jnp.int32)
-    return integrate(model, coordinates, first, time_step, steps_per_snapshot, snapshots)
+def _run(times, model, coordinates):
+    return times.run(model, coordinates)
 
 
 def mapped_run(

@@ -13,9 +13,11 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int
 
+from jaxsph import Schedule
+
 from ..dynamics.points_model import PointsModel
 from .reduced_flow import ReducedFlow
-from .schedule import EvenTimes, Schedule
+from .times import EvenTimes, Times
 
 BATCH = 500  # members; what a step touches then stays in cache
 
@@ -41,9 +43,7 @@ def sweep(
     flow: ReducedFlow,
     starts: Float[Array, "members modes"],
     values: Float[Array, " *members_and_coefficients"],
-    time_step: float,
-    steps_per_snapshot: int,
-    snapshots: int,
+    schedule: Schedule,
     *,
     batch: int = BATCH,
     progress: Callable[[int], None] | None = None,
@@ -57,35 +57,29 @@ def sweep(
         flow: to run.
         starts: coordinates at the start.
         values: theta of each member; a viscosity [m^2/s], say.
-        time_step: dt [s].
-        steps_per_snapshot: between snapshots.
-        snapshots: number of intervals.
+        schedule: of all members.
         batch: members that a device runs at a time.
         progress: is called with the number of members done since its last call.
 
     Raises:
         ValueError: if there is no member, or there are not as many starts as coefficients.
     """
-    if snapshots < 1 or steps_per_snapshot < 1:
-        raise ValueError(
-            f"snapshots: at least one interval of one step, got {snapshots} of "
-            f"{steps_per_snapshot}."
-        )
-    step = jnp.asarray(time_step, flow.reference.points.dtype)
-    schedule = EvenTimes(step, steps_per_snapshot, snapshots)
-    return swept(flow, starts, values, schedule, batch=batch, progress=progress)
+    if schedule.intervals < 1:
+        raise ValueError("schedule: at least one interval to run, got none.")
+    times = EvenTimes.of(schedule, flow.reference.points.dtype)
+    return swept(flow, starts, values, times, batch=batch, progress=progress)
 
 
 def swept(
     flow: ReducedFlow,
     starts: Float[Array, "members modes"],
     values: Float[Array, " *members_and_coefficients"],
-    schedule: Schedule,
+    times: Times,
     *,
     batch: int = BATCH,
     progress: Callable[[int], None] | None = None,
 ) -> Sweep:
-    """`sweep` at the times of a schedule."""
+    """`sweep` at given times."""
     dtype = flow.reference.points.dtype
     starts, values = (np.asarray(a, dtype) for a in (starts, values))
     count = len(values)
@@ -97,14 +91,14 @@ def swept(
     devices = jax.local_devices()
     spread = NamedSharding(Mesh(np.asarray(devices), ("members",)), PartitionSpec("members"))
     size = len(devices) * min(batch, -(-count // len(devices)))
-    coordinates = np.empty((count, schedule.count, flow.system.size), dtype)
+    coordinates = np.empty((count, times.count, flow.system.size), dtype)
     faults = np.empty((2, count), np.int32)
     seconds, first = [], None
     for begin in range(0, count, size):
         rows = np.arange(begin, min(begin + size, count))
         filled = np.resize(rows, size)  # the last batch repeats members to be full
         arguments = (
-            flow.system, flow.bound, schedule, jax.device_put(starts[filled], spread),
+            flow.system, flow.bound, times, jax.device_put(starts[filled], spread),
             jax.device_put(values[filled], spread),
         )  # fmt: skip
         if first is None:
@@ -122,11 +116,11 @@ def swept(
 
 
 @eqx.filter_jit
-def batch_of(system, bound, schedule, starts, values):
+def batch_of(system, bound, times, starts, values):
     """Coordinates, fault code and step of members; pure."""
 
     def member(start, values):
-        found, fault, good = schedule.run(PointsModel(system, values, bound), start)
+        found, fault, good = times.run(PointsModel(system, values, bound), start)
         return jnp.where(good[:, None], found, jnp.nan), fault.code, fault.step
 
     return jax.vmap(member)(starts, values)

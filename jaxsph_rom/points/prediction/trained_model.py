@@ -12,8 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsph import Fluid, ParticleState, SPHFunctional, Trajectory
+from jaxsph import Fluid, ParticleState, Schedule, SPHFunctional, Trajectory
 from jaxsph.scenes import Scene
+from jaxsph.shown import concrete, line, spread
+from jaxsph.shown import table as shown_table
 
 from ..dynamics.coefficients import Coefficients
 from ..dynamics.log_density import to_log_density
@@ -23,8 +25,8 @@ from ..parameters.through_host import through_host
 from .indicator import Indicator, indicated
 from .prediction import Maker, Prediction
 from .reduced_flow import ReducedFlow
-from .schedule import EvenTimes, GivenTimes, Schedule
 from .sweep import batch_of, swept
+from .times import EvenTimes, GivenTimes, Times
 
 _EDGE = 1e-6  # of a parameter's range: so much beyond is not outside
 _POSITIVE = (".viscosity", ".sound_speed", ".delta", ".alpha")
@@ -54,9 +56,7 @@ class TrainedModel(eqx.Module):
         law, between: theta of the parameters, by law if there is one and between the points.
         start_law, start_between: coordinates at the start, likewise.
         indicator: of errors.
-        time_step: dt [s] (static).
-        steps_per_snapshot: between snapshots (static).
-        snapshots: intervals between snapshots in a training run (static).
+        schedule: of the training runs (static).
         scene: name of the scenes (static).
         parameters: record of the first (static).
         training: how it was trained, what that cost and what errors are left (static).
@@ -90,37 +90,43 @@ class TrainedModel(eqx.Module):
     start_law: Law | None
     start_between: Between
     indicator: Indicator
-    time_step: float = eqx.field(static=True)
-    steps_per_snapshot: int = eqx.field(static=True)
-    snapshots: int = eqx.field(static=True)
+    schedule: Schedule = eqx.field(static=True)
     scene: str = eqx.field(static=True)
     parameters: dict[str, Any] = eqx.field(static=True)
     training: dict[str, Any] = eqx.field(static=True)
     source: Training | None = eqx.field(static=True, default=None)
 
-    def __repr__(self) -> str:
-        ranges = ", ".join(f"{n} {low:g} to {high:g}" for n, (low, high) in self.range.items())
-        size, runs = self.flow.basis.size, len(self.points)
-        return (
-            f"TrainedModel({self.scene}: {size} modes, {runs} runs over {ranges}, to "
-            f"t = {self.end_time:g} s)"
-        )
+    def _rows(self) -> dict[str, str] | None:
+        if not concrete(self.points, self.flow.basis.modes):
+            return None
+        told = self.training
+        kinds = [k for k in (told["formulation"], told["reduction"]) if k]
+        if told["closure"] != "none":
+            kinds.append(f"{told['closure']} closure")
+        errors = [r["errors"] for r in told["runs"] if isinstance(r["errors"], dict)]
+        percent = [e["velocity_median_percent"] for e in errors]
+        lost = len(told["runs"]) - len(errors)
+        return {
+            "scene": self.scene,
+            "runs": str(len(self.points)),
+            **{name: f"{low:g} to {high:g}" for name, (low, high) in self.range.items()},
+            "modes": f"{self.flow.basis.size} on {len(self.flow.reference.points)} points",
+            "made by": ", ".join(kinds),
+            "time": f"to {self.schedule.end_time:g} s",
+            "error on its runs": spread(percent, "%") + (f", {lost} lost" if lost else ""),
+        }
+
+    def __repr__(self):
+        return line(self, self._rows())
+
+    def _repr_html_(self):
+        return shown_table(self, self._rows())
 
     @property
     def range(self) -> dict[str, tuple[float, float]]:
         """Lowest and highest training value of each parameter."""
         low, high = (np.asarray(f(self.points, axis=0)) for f in (np.min, np.max))
         return {n: (float(a), float(b)) for n, a, b in zip(self.names, low, high, strict=True)}
-
-    @property
-    def interval(self) -> float:
-        """Time between two snapshots [s]."""
-        return self.time_step * self.steps_per_snapshot
-
-    @property
-    def end_time(self) -> float:
-        """End of the training runs [s]."""
-        return self.interval * self.snapshots
 
     def predict(
         self,
@@ -146,7 +152,7 @@ class TrainedModel(eqx.Module):
             ValueError: for names that are not the model's, values that are not finite or that
                 `make` refuses, or times that do not increase from 0 on.
         """
-        schedule, time = self._schedule(times)
+        wanted, time = self._times(times)
         traced = _traced((parameters, start))
         points = self._traced_points(parameters) if traced else self._points(parameters)
         values, operators = self._values(points, traced)
@@ -154,12 +160,12 @@ class TrainedModel(eqx.Module):
         seconds = {}
         if traced:
             flow = self.flow
-            found, code, step = batch_of(flow.system, flow.bound, schedule, starts, values)
+            found, code, step = batch_of(flow.system, flow.bound, wanted, starts, values)
         else:
-            done = swept(self.flow, starts, values, schedule, progress=progress)
+            done = swept(self.flow, starts, values, wanted, progress=progress)
             found, code, step = done.coordinates, done.code, done.step
             seconds = {"run_seconds": done.run_seconds, "compile_seconds": done.compile_seconds}
-        if isinstance(schedule, EvenTimes):
+        if isinstance(wanted, EvenTimes):
             join = jnp.concatenate if traced else np.concatenate
             found = join([starts[:, None], found], axis=1)
         return Prediction(
@@ -182,10 +188,10 @@ class TrainedModel(eqx.Module):
         values = jnp.asarray(values, self.functional.mass.dtype)
         return self.coefficients.applied(self.functional, values).fluid
 
-    def indicate(self, values, time, coordinates) -> Float[Array, " members"]:
+    def indicate(self, points, values, time, coordinates) -> Float[Array, " members"]:
         """The expected error of each member (`Indicator`)."""
         dtype = self.flow.reference.points.dtype
-        arguments = (jnp.asarray(a, dtype) for a in (values, time, coordinates))
+        arguments = (jnp.asarray(a, dtype) for a in (points, values, time, coordinates))
         found = indicated(self.indicator, self.flow, *arguments)
         return found if _traced((values, coordinates)) else np.asarray(found)
 
@@ -220,14 +226,12 @@ class TrainedModel(eqx.Module):
 
         save(path, self)
 
-    def _schedule(self, times) -> tuple[Schedule, Float[np.ndarray, " times"]]:
+    def _times(self, times) -> tuple[Times, Float[np.ndarray, " times"]]:
         dtype = self.flow.reference.points.dtype
         if times is None:
-            step = jnp.asarray(self.time_step, dtype)
-            schedule = EvenTimes(step, self.steps_per_snapshot, self.snapshots)
-            return schedule, self.interval * np.arange(self.snapshots + 1)
-        schedule = GivenTimes.of(times, self.time_step, dtype)
-        return schedule, np.atleast_1d(np.asarray(times, float))
+            return EvenTimes.of(self.schedule, dtype), self.schedule.times
+        given = GivenTimes.of(times, self.schedule.time_step, dtype)
+        return given, np.atleast_1d(np.asarray(times, float))
 
     def _points(self, parameters) -> Float[np.ndarray, "members names"]:
         names, points = table(parameters)
@@ -257,7 +261,7 @@ class TrainedModel(eqx.Module):
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         edge = _EDGE * np.maximum(np.abs(low), np.abs(high))
         beyond = ((points < (low - edge)[None]) | (points > (high + edge)[None])).any(axis=1)
-        late = bool(time[-1] > self.end_time * (1.0 + _EDGE))
+        late = bool(time[-1] > self.schedule.end_time * (1.0 + _EDGE))
         return beyond | xp.full(beyond.shape, late)
 
     def _values(self, points, traced: bool):

@@ -78,8 +78,10 @@ def _check_first_interval(scene: Scene, run: Trajectory, k: int, named) -> None:
         )
 
 
-def _record(parameters: dict[str, Any]) -> str:
+def _record(parameters: dict[str, Any]) -> dict[str, Any]:
+    """As a file has it; 50 and 50.0 are the same number."""
+
     def plain(value):
         return value.item() if hasattr(value, "item") else str(value)
 
-    return json.dumps(parameters, default=plain, sort_keys=True)
+    return json.loads(json.dumps(parameters, default=plain))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import equinox as eqx
@@ -40,9 +40,14 @@ class Formulation(abc.ABC):
 
     @abc.abstractmethod
     def basis(
-        self, scene: Scene, reference: ReferenceSpace, mapped: Sequence[np.ndarray], modes: int
+        self,
+        scene: Scene,
+        reference: ReferenceSpace,
+        mapped: Sequence[np.ndarray],
+        modes: int | None,
     ) -> Basis:
-        """Modes of (r, u); the first of them are those of fewer modes."""
+        """Modes of (r, u), as many as there are if no number is given; the first of them are those
+        of fewer modes."""
 
     @abc.abstractmethod
     def finished(
@@ -110,7 +115,7 @@ class Solenoidal(Formulation):
         return solenoidal_basis(np.concatenate(mapped, axis=-1), operators, modes)
 
     def finished(self, flow, scene, projected, mapped):
-        interval = scene.time_step * scene.steps_per_snapshot
+        interval = scene.schedule.interval
         crossing = max(scene.space.box.lengths) / float(scene.fluid.sound_speed)
         last = min(len(run.coordinates) for run in projected) - 1
         recovery = fit_recovery(
@@ -136,9 +141,9 @@ def _predicted(
     flow: ReducedFlow, scene: Scene, run: ProjectedRun
 ) -> Float[np.ndarray, "times modes"]:
     """Coordinates of a run by the flow itself, or its own where the flow is lost."""
-    start, count = run.coordinates[:1], len(run.coordinates) - 1
-    steps = scene.time_step, scene.steps_per_snapshot, count
+    start = run.coordinates[:1]
+    schedule = replace(scene.schedule, intervals=len(run.coordinates) - 1)
     try:
-        return np.concatenate([start, flow.predict(jnp.asarray(start[0]), run.values, *steps)])
+        return np.concatenate([start, flow.predict(jnp.asarray(start[0]), run.values, schedule)])
     except SimulationError:
         return run.coordinates

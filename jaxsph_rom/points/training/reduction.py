@@ -110,7 +110,7 @@ class Samples(Reduction):
         return EulerianRates.of_scene(scene, points, coefficients)
 
     def dynamics(self, prepared, scene, basis, runs):
-        interval = scene.time_step * scene.steps_per_snapshot
+        interval = scene.schedule.interval
         visited = [
             VisitedStates(run.values, interval * np.arange(len(run.coordinates)), run.coordinates)
             for run in runs

@@ -5,17 +5,16 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Trajectory, run_scene
 from jaxsph.arrangements import Lattice
-from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import Scene
 
@@ -24,15 +23,16 @@ from ...reference import ReferenceSpace
 from ..dynamics.eulerian_rates import EulerianRates
 from ..parameters.family import Family, Training
 from ..parameters.laws import Between, Law
-from ..prediction.indicator import Indicator, Places, indicated, scale_of, velocity_error
+from ..prediction.indicator import Indicator, Places
 from ..prediction.reduced_flow import ReducedFlow, mapped_run
 from ..prediction.trained_model import TrainedModel, projected_start
 from .belonging import check_runs
-from .closure import ProjectedRun, fit_linear_closure
+from .closure import fit_linear_closure
 from .formulation import Compressible, Formulation
 from .linear_closure import LinearClosure
 from .reduction import Reduction, Tensors
 from .training_errors import training_errors
+from .trials import Project, left_out_of, own_scale, scale_of_closed
 
 # label and iterations -> context manager that gives a function to report iterations to
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[int], None]]]
@@ -127,35 +127,6 @@ def _prepared(training: Training, reduction: Reduction) -> tuple[ReferenceSpace,
     return reference, found
 
 
-class _Project(NamedTuple):
-    """What is the same for all numbers of modes."""
-
-    training: Training
-    reference: ReferenceSpace
-    formulation: Formulation
-    reduction: Reduction
-    prepared: Any
-    places: Places
-
-    @property
-    def first(self) -> Scene:
-        return self.training.scenes[0]
-
-    def flow(self, mapped: Sequence[np.ndarray], numbers: Sequence[int], basis):
-        """The flow of some training runs in a basis, before closure and recovery, and these."""
-        flow = ReducedFlow(self.reference, basis, None, self.first.fluid)
-        runs = [
-            ProjectedRun(self.training.values[k], np.asarray(flow.project(mapped[k])))
-            for k in numbers
-        ]
-        dynamics = self.reduction.dynamics(self.prepared, self.first, basis, runs)
-        return ReducedFlow(self.reference, basis, dynamics, self.first.fluid), runs
-
-    @property
-    def steps(self) -> tuple[float, int]:
-        return self.first.time_step, self.first.steps_per_snapshot
-
-
 def train_each(
     make: Callable[..., Scene] | Family,
     parameters: Sequence[Mapping[str, Any]],
@@ -168,6 +139,11 @@ def train_each(
     progress: Progress | None = None,
 ) -> Iterator[TrainedModel]:
     """`train` for several numbers of modes; runs are made, mapped and decomposed once."""
+    kinds = {"closure": LinearClosure, "formulation": Formulation, "reduction": Reduction}
+    given = (closure, formulation, reduction)
+    for (name, kind), value in zip(kinds.items(), given, strict=True):
+        if value is not None and not isinstance(value, kind):
+            raise ValueError(f"{name}: an object of a {kind.__name__}, got {value!r}.")
     family = make if isinstance(make, Family) else Family(make)
     training = Training(family, parameters)
     first = training.scenes[0]
@@ -185,7 +161,7 @@ def train_each(
         training.functionals[0], reference.points, training.coefficients, listed=False
     )
     places = Places.among(rates)
-    project = _Project(training, reference, formulation, reduction, prepared, places)
+    project = Project(training, reference, formulation, reduction, prepared, places)
     mapped = [mapped_run(reference, run, first.fluid) for run in runs]
     largest = formulation.basis(first, reference, mapped, max(modes))
     offline += clock.perf_counter() - before
@@ -207,7 +183,7 @@ def _full_seconds(runs: Sequence[Trajectory]) -> float | None:
 
 
 def _trained(
-    project: _Project, mapped, basis, closure: LinearClosure | None, progress, seconds
+    project: Project, mapped, basis, closure: LinearClosure | None, progress, seconds
 ) -> TrainedModel:
     training, first = project.training, project.first
     everything = range(len(mapped))
@@ -220,7 +196,7 @@ def _trained(
         "coefficients": list(training.coefficients.names),
         "closure": "none",
     }
-    scale, left_out = _left_out(project, mapped, basis.size)
+    scale, left_out = left_out_of(project, mapped, basis.size)
     made |= seconds
     made["offline_seconds"] += clock.perf_counter() - before
     if closure is None:
@@ -230,10 +206,10 @@ def _trained(
         flow, learnt = _closed(flow, training, first, runs, closure, progress)
         made |= learnt
         flow = project.formulation.finished(flow, first, runs, mapped)
-        scale = _scale_of_closed(flow, open_, project, mapped, left_out)
+        scale = scale_of_closed(flow, open_, project, mapped, left_out)
     made["runs"] = training_errors(flow, training, runs, mapped)
-    if not left_out and not np.isfinite(scale):
-        scale = _own_scale(flow, project, runs, mapped)
+    if not left_out and not scale.known:
+        scale = own_scale(flow, project, mapped)
     made["left_out"] = left_out
     starts = np.stack([run.coordinates[0] for run in runs])
     between = training.points, training.values[: len(training.points)]
@@ -244,9 +220,8 @@ def _trained(
         flow, training.functionals[0], training.coefficients, training.names, training.points,
         law, Between.of(*between), _start_law(flow, training, starts),
         Between.of(training.points, starts), Indicator.of(flow, project.places, scale),
-        time_step=first.time_step, steps_per_snapshot=first.steps_per_snapshot,
-        snapshots=len(runs[0].coordinates) - 1, scene=first.name, parameters=first.parameters,
-        training=made, source=training,
+        schedule=replace(first.schedule, intervals=len(runs[0].coordinates) - 1), scene=first.name,
+        parameters=first.parameters, training=made, source=training,
     )  # fmt: skip
 
 
@@ -274,14 +249,14 @@ def _label(training: Training, k: int) -> str:
 def _check(training: Training, modes, closure: LinearClosure | None, runs) -> None:
     """A ValueError for what is known to fail before a full run."""
     first, count = training.scenes[0], len(training.scenes)
-    available = count * (1 + first.steps // first.steps_per_snapshot)
+    available = _starts(training.scenes) + count * first.schedule.intervals
     for wanted in modes:
         if isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or wanted < 1:
             raise ValueError(f"modes: a number from 1 on, got {wanted!r}.")
         if wanted > available:
             raise ValueError(
-                f"modes: {wanted} asked for, but the training runs give {available} snapshots; "
-                "ask for fewer modes, a longer run or more training runs."
+                f"modes: {wanted} asked for, but the training runs give {available} different "
+                "snapshots at most, rest apart; ask for fewer modes, a longer run or more runs."
             )
     if closure is not None and closure.held_back is not None:
         if dict(closure.held_back) not in [training.named(p) for p in training.points]:
@@ -297,56 +272,10 @@ def _check(training: Training, modes, closure: LinearClosure | None, runs) -> No
             scene.search()  # what the box is too small for
 
 
-def _left_out(project: _Project, mapped, modes: int) -> tuple[float, list[dict[str, float]]]:
-    """The indicator's scale, and error and residual of each run by a model without it."""
-    numbers = range(len(mapped))
-    if len(mapped) < 2:
-        return float("nan"), []
-    found = []
-    for k in numbers:
-        others = [j for j in numbers if j != k]
-        snapshots = sum(mapped[j].shape[-1] for j in others)
-        basis = project.formulation.basis(
-            project.first, project.reference, [mapped[j] for j in others], min(modes, snapshots)
-        )
-        flow, runs = project.flow(mapped, others, basis)
-        flow = project.formulation.finished(flow, project.first, runs, [mapped[j] for j in others])
-        found.append(_judged(flow, project, k, mapped[k]))
-    scale = scale_of([f["error"] for f in found], [f["residual"] for f in found])
-    return scale, found
-
-
-def _scale_of_closed(flow, open_, project: _Project, mapped, left_out) -> float:
-    """The scale of a closed flow: that of its own errors, and by how much leaving a run out makes
-    the errors of the open flow larger; to leave runs out of the closure as well would cost its
-    training once for each."""
-    own = _own_scale(flow, project, None, mapped)
-    before = [_judged(open_, project, k, fields)["error"] for k, fields in enumerate(mapped)]
-    pairs = [(found["error"], b) for found, b in zip(left_out, before, strict=False)]
-    good = [a / b for a, b in pairs if np.isfinite(a) and np.isfinite(b) and a > 0.0 and b > 0.0]
-    return own * max(1.0, float(np.exp(np.mean(np.log(good))))) if good else own
-
-
-def _own_scale(flow, project: _Project, runs, mapped) -> float:
-    """The scale where there is one run: that of its own error."""
-    found = [_judged(flow, project, k, fields) for k, fields in enumerate(mapped)]
-    return scale_of([f["error"] for f in found], [f["residual"] for f in found])
-
-
-def _judged(flow: ReducedFlow, project: _Project, k: int, fields) -> dict[str, float]:
-    """Error and residual of the reduced run at a training point."""
-    start = flow.project(fields[..., 0])
-    values = project.training.values[k]
-    time = project.steps[0] * project.steps[1] * np.arange(fields.shape[-1])
-    try:
-        after = flow.predict(start, values, *project.steps, len(time) - 1)
-    except SimulationError:
-        return {"error": float("inf"), "residual": float("inf")}
-    coordinates = np.concatenate([np.asarray(start)[None], after])
-    arguments = (jnp.asarray(a) for a in (values[None], time, coordinates[None]))
-    residual = indicated(Indicator.of(flow, project.places, 1.0), flow, *arguments)
-    error = velocity_error(flow, coordinates, fields[:, 1:])
-    return {"error": error, "residual": float(residual[0])}
+def _starts(scenes: Sequence[Scene]) -> int:
+    """How many different starts there are; rest is none, as the modes are about it."""
+    states = (np.concatenate([s.state.density[:, None], s.state.velocity], 1) for s in scenes)
+    return len({state.tobytes() for state in states if np.ptp(state, axis=0).any()})
 
 
 def _closed(flow, training, scene, projected, closure, progress):

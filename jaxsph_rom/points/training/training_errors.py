@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import jax.numpy as jnp
@@ -32,7 +33,6 @@ def training_errors(
     median over time.
     """
     found, first = [], training.scenes[0]
-    steps = first.time_step, first.steps_per_snapshot
     for k, (run, fields) in enumerate(zip(projected, mapped, strict=True)):
         fluid = training.scenes[k].fluid
         density = from_log_density(jnp.asarray(fields[:, 0].T), fluid)
@@ -41,8 +41,8 @@ def training_errors(
         row: dict[str, Any] = {"parameters": training.named(training.points[k])}
         row["floor"] = discrepancies(flow, fluid, run.coordinates, truth)
         try:
-            start, count = jnp.asarray(run.coordinates[0]), len(run.coordinates) - 1
-            after = flow.predict(start, run.values, *steps, count)
+            schedule = replace(first.schedule, intervals=len(run.coordinates) - 1)
+            after = flow.predict(jnp.asarray(run.coordinates[0]), run.values, schedule)
         except SimulationError as error:
             row["errors"] = str(error)
         else:

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxsph import Fluid
+from jaxsph.fluid import TaitEquationOfState
 from jaxsph.kernels import WendlandC4
 from jaxsph.walls import BallRegion, BoxRegion, SignedDistance
 from jaxsph_rom.points.files.object_tree import read, write
@@ -52,6 +54,15 @@ def test_a_tree_comes_back(tmp_path):
     assert found.parts[:3] == parts[:3] and found.parts[4:] == parts[4:]
     assert type(found.parts[3]) is Pair and found.parts[3].first == 3
     assert isinstance(found.parts[3].second, np.ndarray)
+
+
+def test_a_fluids_equation_of_state_comes_back(tmp_path):
+    fluid = Fluid(1000.0, 10.0, 1.0, TaitEquationOfState())
+    found = there_and_back(tmp_path / "tree.h5", fluid)
+    # c0^2 rho0 / 7 (1.05^7 - 1); a linear one has 5000 Pa
+    wanted = 1e5 / 7.0 * (1.05**7 - 1.0)
+    np.testing.assert_allclose(found.pressure(jnp.asarray(1050.0)), wanted, rtol=1e-6)
+    assert wanted == pytest.approx(5816, abs=1.0)
 
 
 def test_what_no_module_has_is_refused(tmp_path):

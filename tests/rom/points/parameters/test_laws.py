@@ -66,3 +66,25 @@ def test_a_function_of_the_host_is_differentiated_through(dtype, allowed):
     np.testing.assert_allclose(found, wanted, rtol=allowed, atol=allowed)
     several = jax.vmap(traced)(jnp.stack([point, 2.0 * point]))
     np.testing.assert_allclose(several[1], function(2.0 * np.asarray(point)), rtol=1e-6)
+
+
+def test_of_no_numbers_there_is_a_law():
+    points = np.array([[1.0], [2.0]])
+    law = Law.find(points, np.zeros((2, 0)))
+    assert law is not None and law(points[0]).shape == (0,)
+
+
+def test_in_single_precision_an_inverse_is_no_parabola():
+    points = np.linspace(50.0, 100.0, 6)[:, None]
+    law = Law.find(points, (1.0 / points).astype(np.float32))
+    assert law.inverted == ((True,),)
+    np.testing.assert_allclose(law(np.array([20.0])), 1.0 / 20.0, rtol=1e-4)
+    # a value that stays is no inverse either
+    constant = Law.find(points, np.full((6, 1), 0.3, np.float32))
+    np.testing.assert_allclose(constant(np.array([1e-3])), 0.3, rtol=1e-4)
+
+
+def test_what_is_only_nearly_a_parabola_has_no_law_in_any_precision():
+    points = np.linspace(50.0, 100.0, 6)[:, None]
+    for dtype in (np.float32, np.float64):
+        assert Law.find(points, np.exp(points / 50.0).astype(dtype)) is None

@@ -108,11 +108,14 @@ def test_it_is_kept_in_a_file(cavity, tmp_path):
         a, b = (getattr(t.flow.recovery, name) for t in (trained, found))
         np.testing.assert_array_equal(a, b)
     assert trained.flow.truncated(2).recovery is None
+    assert eqx.tree_equal(found.functional.walls, trained.functional.walls)  # they keep tracers in
 
 
 def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
     trained, scene = cavity
     prediction = trained.predict({"reynolds": 70.0})
+    with pytest.raises(ValueError, match="member: 5; the prediction has 1"):
+        prediction.fields(5)
     everywhere = prediction.fields(0)
     some = np.asarray(trained.flow.reference.points)[3:90:10]
     found = prediction.fields(0, some)
@@ -120,7 +123,7 @@ def test_fields_elsewhere_and_tracers_are_recovered_too(cavity):
     np.testing.assert_allclose(found.pressure, everywhere.pressure[:, 3:90:10], atol=1e-6)
     model = TracerModel.of(trained.flow, jnp.asarray(1.0 / 70.0), scene.walls)
     start = TracerState(jnp.asarray(prediction.coordinates[0, 0]), jnp.asarray(some))
-    step = jnp.asarray(trained.time_step)
+    step = jnp.asarray(trained.schedule.time_step)
     run = eqx.filter_jit(lambda m, s: integrate(m, s, jnp.asarray(0), step, 10, 2))
     _, fault, seen, _ = run(model, start)
     assert int(fault.code) == 0 and np.isfinite(seen.pressure).all()

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import SimulationError, run_scene
+from jaxsph import Schedule, SimulationError, run_scene
 from jaxsph.arrangements import Lattice, Stirred
 from jaxsph.scenes import taylor_green
 from jaxsph_rom import Euclidean, MeanCentred, block_pod
@@ -72,8 +72,7 @@ def test_any_centre_and_any_decomposition(flow_and_run, settings):
     found = flow.fields(coordinates[:2], run.time[:2], np.asarray(points)[5:90:7])
     np.testing.assert_allclose(found.velocity, fields.velocity[:2, 5:90:7], atol=1e-9)
     np.testing.assert_allclose(found.density, fields.density[:2, 5:90:7], atol=1e-7)
-    arguments = (0.01, scene.time_step, scene.steps_per_snapshot, len(run.time) - 1)
-    after = flow.fields(flow.predict(coordinates[0], *arguments), run.time[1:])
+    after = flow.fields(flow.predict(coordinates[0], 0.01, scene.schedule), run.time[1:])
     # the run that it knows, within a percent of the largest speed
     assert np.abs(after.velocity - np.moveaxis(mapped[:, 1:, 1:], -1, 0)).max() < 0.01
 
@@ -89,9 +88,7 @@ def mapped_run_of(fields, flow, scene):
 def test_it_predicts_the_run_that_it_knows(flow_and_run):
     flow, run, scene = flow_and_run
     coordinates = flow.project(mapped_run(flow.reference, run, scene.fluid))
-    found = flow.predict(
-        coordinates[0], 0.01, scene.time_step, scene.steps_per_snapshot, len(run.time) - 1
-    )
+    found = flow.predict(coordinates[0], 0.01, scene.schedule)
     np.testing.assert_allclose(found[:, 0], coordinates[1:, 0], rtol=0.005)
 
 
@@ -108,4 +105,4 @@ def test_a_flow_that_grows_beyond_all_bounds_is_named(flow_and_run):
     wild = QuadraticSystem(jnp.zeros((2, 1)), jnp.zeros((2, 1, 1)), jnp.full((1, 1, 1), 50.0))
     wild = ReducedFlow(flow.reference, flow.basis.truncated(1), wild, flow.fluid)
     with pytest.raises(SimulationError, match="step"):  # da/dt = 50 a^2 is infinite at t = 0.02
-        wild.predict(jnp.ones(1), 0.01, 1e-3, 5, 10)
+        wild.predict(jnp.ones(1), 0.01, Schedule(1e-3, 5, 10))

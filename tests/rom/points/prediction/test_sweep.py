@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import Box, Fluid, SimulationError, Space
+from jaxsph import Box, Fluid, Schedule, SimulationError, Space
 from jaxsph.arrangements import Lattice
 from jaxsph.integrate import FaultCode
 from jaxsph.interpolation import ShepardMap
@@ -18,7 +18,7 @@ from jaxsph_rom.points import (
 )
 
 MODES = 3
-STEPS = (0.01, 2, 20)  # time step, steps per snapshot, snapshots
+STEPS = Schedule(time_step=0.01, steps_per_snapshot=2, intervals=20)
 
 
 def make_flow(growth=0.0):
@@ -47,10 +47,10 @@ def test_members_are_single_runs(batch):
     rng = np.random.default_rng(1)
     starts, viscosities = rng.normal(size=(7, MODES)), rng.uniform(0.005, 0.02, 7)
     done = []
-    found = sweep(flow, starts, viscosities, *STEPS, batch=batch, progress=done.append)
+    found = sweep(flow, starts, viscosities, STEPS, batch=batch, progress=done.append)
     assert sum(done) == 7 and (found.code == 0).all() and (found.step == -1).all()
     for k in range(7):
-        alone = flow.predict(jnp.asarray(starts[k]), viscosities[k], *STEPS)
+        alone = flow.predict(jnp.asarray(starts[k]), viscosities[k], STEPS)
         np.testing.assert_allclose(found.coordinates[k], alone, rtol=0, atol=1e-14)
     assert found.run_seconds > 0
 
@@ -58,12 +58,12 @@ def test_members_are_single_runs(batch):
 def test_one_that_blows_up_takes_no_other_along():
     flow = make_flow(growth=50.0)
     starts = np.array([[1.0, 0.5, 0.0], [1.0, 0.5, 1.0], [1.0, 0.5, 0.1]])
-    found = sweep(flow, starts, np.full(3, 0.01), *STEPS)
+    found = sweep(flow, starts, np.full(3, 0.01), STEPS)
     lost = FaultCode.ENERGY_OUT_OF_BOUNDS
     assert found.code.tolist() == [0, lost, lost]
     assert np.isfinite(found.coordinates[0]).all()
     with pytest.raises(SimulationError, match="more energy") as caught:
-        flow.predict(jnp.asarray(starts[1]), 0.01, *STEPS)
+        flow.predict(jnp.asarray(starts[1]), 0.01, STEPS)
     assert caught.value.step == found.step[1]
     # da/dt = 50 a^2 - 0.2 a is infinite soon after t = 1 / (50 a)
     assert 1 <= found.step[1] <= 5 < found.step[2]
@@ -88,4 +88,4 @@ def test_energy_is_that_of_the_fields():
 
 def test_without_members_there_is_no_sweep():
     with pytest.raises(ValueError, match="at least one"):
-        sweep(make_flow(), np.zeros((0, MODES)), np.zeros(0), *STEPS)
+        sweep(make_flow(), np.zeros((0, MODES)), np.zeros(0), STEPS)

@@ -16,7 +16,10 @@ from jaxsph.arrangements import Lattice
 from jaxsph.effects import Effect, Gravity, LaminarViscosity
 from jaxsph.fluid import TaitEquationOfState
 from jaxsph.kernels import WendlandC2, WendlandC4
-from jaxsph.scenes import taylor_green
+from jaxsph.scenes import couette, poiseuille, taylor_green
+from jaxsph.schemes import Consistent
+from jaxsph_rom.points import FlowFileError
+from jaxsph_rom.points.training.belonging import check_runs
 
 POINTS = [
     {"viscosity": 0.01, "force": 0.5},
@@ -86,7 +89,13 @@ def test_a_model_comes_back_from_its_file_and_needs_nothing_else(trained, tmp_pa
     np.testing.assert_array_equal(mine.coordinates, theirs.coordinates)
     np.testing.assert_array_equal(mine.error_indicator, theirs.error_indicator)
     np.testing.assert_array_equal(mine.fields(1).pressure, theirs.fields(1).pressure)
-    assert again.training == trained.training and "viscosity 0.01 to 0.02" in repr(again)
+    assert again.training == trained.training and "viscosity: 0.01 to 0.02" in repr(again)
+
+
+def test_a_model_in_double_precision_is_not_loaded_in_single(trained, tmp_path):
+    trained.save(tmp_path / "model.h5")
+    with jax.enable_x64(False), pytest.raises(FlowFileError, match="is in double precision"):
+        jaxsph_rom.load(tmp_path / "model.h5")
 
 
 def test_derivatives_in_parameters_and_start(trained):
@@ -123,6 +132,19 @@ def test_a_prediction_comes_out_of_traced_code(trained):
 
     _, ends = jax.lax.scan(after, 0.8, None, length=2)
     np.testing.assert_allclose(ends[1], wanted.coordinates[0, -1], rtol=0, atol=1e-12)
+
+
+def test_models_and_predictions_show_what_they_are(trained):
+    shown = repr(trained)
+    assert "modes: 5 on 144 points" in shown and "viscosity: 0.01 to 0.02" in shown
+    assert "error on its runs: 0." in shown and len(shown) < 400
+    prediction = trained.predict({"viscosity": [0.015, 0.05], "force": 0.8})
+    shown = repr(prediction)
+    assert "members: 2, viscosity: 0.015 to 0.05" in shown and "outside: 1, lost: 0" in shown
+    assert "expected" not in shown  # it is not worked out to be shown
+    expected = 100.0 * prediction.error_indicator
+    assert f"expected error: {expected.min():.4g} to {expected.max():.4g} %" in repr(prediction)
+    assert "<th" in prediction._repr_html_() and "taylor-green" in trained._repr_html_()
 
 
 def test_times_of_ones_own(trained):
@@ -170,6 +192,8 @@ def test_runs_that_are_not_those_of_the_scenes(runs):
     refused([runs[1], runs[0], *runs[2:]], "runs: number 0 does not move as")
     refused([cut(run, slice(None, None, 2)) for run in runs], "runs: number 0 has")
     refused([cut(runs[0], slice(3)), *runs[1:]], "runs: number 0 has 3 snapshots")
+    whole = dataclasses.replace(runs[0], metadata={"parameters": {"a": 1}})  # and not 1.0
+    check_runs([make(**POINTS[0])], [whole], str)
     named = [
         dataclasses.replace(run, metadata={"parameters": {"k": k}}) for k, run in enumerate(runs)
     ]
@@ -252,10 +276,18 @@ def test_a_cubic_drag_is_trained_by_samples(tmp_path):
 def test_the_first_snapshot_counts():
     with pytest.raises(ValueError, match="modes: 500 asked for"):
         jaxsph_rom.train(make, POINTS, modes=500)
+    with pytest.raises(ValueError, match="give 13 different"):  # all start alike
+        jaxsph_rom.train(make, POINTS[:3], modes=14)
     with pytest.raises(ValueError, match="modes: a number from 1 on"):
         jaxsph_rom.train(make, POINTS, modes=0)
     with pytest.raises(ValueError, match="parameters: two training points are the same"):
         jaxsph_rom.train(make, [POINTS[0], POINTS[0]], modes=2)
+    for name, value in (("closure", True), ("formulation", "solenoidal"),
+                        ("reduction", jaxsph_rom.Samples)):  # fmt: skip
+        with pytest.raises(ValueError, match=f"{name}: an object of a"):
+            jaxsph_rom.train(make, POINTS, modes=2, **{name: value})
+    with pytest.raises(ValueError, match="parameters: dictionaries of names and numbers, got 50"):
+        jaxsph_rom.train(make, 50.0, modes=2)
     with pytest.raises(ValueError, match="held_back: "):
         closure = jaxsph_rom.LinearClosure({"viscosity": 7.0, "force": 1.0})
         jaxsph_rom.train(make, POINTS, modes=2, closure=closure)
@@ -294,3 +326,65 @@ def test_where_no_law_holds_the_family_is_asked_and_a_file_says_that_it_interpol
     np.testing.assert_allclose(found.values[0, 0], 0.01 * np.exp(0.5), rtol=1e-12)
     between = 0.01 * np.interp(0.8, [0.0, 0.5, 1.0], np.exp([0.0, 0.5, 1.0]))
     np.testing.assert_allclose(found.values[1, 0], between, rtol=1e-12)
+
+
+def of_mach(mach):
+    return taylor_green(
+        12, 50.0, mach=mach, time_step=0.0025, end_time=0.1, arrangement=Lattice(),
+        scheme=Consistent(),
+    )  # fmt: skip
+
+
+def of_lid(speed):
+    """Water at rest between plates, one of which is set moving at a speed [m/s]."""
+    scene = couette(16, 10.0, h_over_dx=1.5, end_time=0.2, time_step=0.005)
+    walls = dataclasses.replace(scene.walls, velocity=speed * scene.walls.velocity)
+    return dataclasses.replace(scene, walls=walls)
+
+
+def of_reynolds(reynolds):
+    """Its force is 8 / Re, its viscosity 1 / Re."""
+    return poiseuille(16, reynolds, h_over_dx=1.5, end_time=0.4, time_step=0.005)
+
+
+@pytest.mark.parametrize(
+    "family, name, values, unseen, field, bound",
+    [
+        (of_mach, "mach", (0.05, 0.1), 0.07, "pressure", 0.2),  # sound
+        (of_lid, "speed", (0.25, 1.0), 0.5, "velocity", 0.05),
+        (of_reynolds, "reynolds", (20.0, 80.0), 40.0, "velocity", 0.05),
+    ],
+)
+def test_speeds_of_sound_lids_and_forces_are_parameters(family, name, values, unseen, field, bound):
+    points = [{name: value} for value in values]
+    trained = jaxsph_rom.train(family, points, modes=5)  # one lid alone gives four
+    prediction = trained.predict([*points, {name: unseen}])
+    assert not prediction.outside.any() and prediction.operators == "family"
+    for k, value in enumerate((*values, unseen)):
+        full = jaxsph.run_scene(family(value))
+        mapped = np.moveaxis(trained.flow.reference.snapshots(full), -1, 0)
+        wanted = {
+            "pressure": np.asarray(family(value).fluid.pressure(mapped[:, :, 0])),
+            "velocity": mapped[:, :, 1:],
+        }[field]
+        found = getattr(prediction.fields(k), field)
+        late = slice(len(wanted) // 2, None)  # on the average: sound passes
+        wanted, found = wanted[late].mean(axis=0), found[late].mean(axis=0)
+        error = np.std(found - wanted) / np.std(wanted)
+        assert error < bound, (value, error)
+
+
+def test_a_family_may_differ_in_its_start_alone():
+    def of_start(share):
+        scene = make(0.01, 0.5)
+        state = scene.state
+        start = ParticleState(state.position, share * state.velocity, state.density)
+        return dataclasses.replace(scene, state=start)
+
+    trained = jaxsph_rom.train(of_start, [{"share": 0.5}, {"share": 1.0}], modes=3)
+    assert trained.coefficients.names == () and trained.start_law is not None
+    prediction = trained.predict({"share": [0.5, 0.7]})
+    assert prediction.start == "family" and not prediction.status.any()
+    speed = np.linalg.norm(prediction.fields(1).velocity[0], axis=1).max()
+    beside = np.linalg.norm(prediction.fields(0).velocity[0], axis=1).max()
+    assert speed / beside == pytest.approx(1.4, rel=0.01)  # within three modes

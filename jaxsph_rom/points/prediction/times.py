@@ -12,12 +12,13 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxsph import Schedule
 from jaxsph.integrate import Fault, FaultCode, integrate, rk4_step
 
 from ..dynamics.points_model import PointsModel
 
 
-class Schedule(eqx.Module):
+class Times(eqx.Module):
     """Steps from time 0 on, and times at which coordinates are wanted."""
 
     @property
@@ -33,33 +34,39 @@ class Schedule(eqx.Module):
 
 
 @final
-class EvenTimes(Schedule):
+class EvenTimes(Times):
     """At the end of even intervals, by the full model's loop.
 
     Args:
         time_step: dt [s].
-        steps: of dt in an interval.
-        snapshots: intervals.
+        steps: of dt in an interval (static).
+        intervals: how many (static).
     """
 
     time_step: Float[Array, ""]
     steps: int = eqx.field(static=True)
-    snapshots: int = eqx.field(static=True)
+    intervals: int = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, schedule: Schedule, dtype) -> Self:
+        """Those of a schedule."""
+        step = jnp.asarray(schedule.time_step, dtype)
+        return cls(step, schedule.steps_per_snapshot, schedule.intervals)
 
     @property
     def count(self):
-        return self.snapshots
+        return self.intervals
 
     def run(self, model, start):
         first = jnp.zeros((), jnp.int32)
         _, fault, found, good = integrate(
-            model, start, first, self.time_step, self.steps, self.snapshots
+            model, start, first, self.time_step, self.steps, self.intervals
         )
         return found, fault, good
 
 
 @final
-class GivenTimes(Schedule):
+class GivenTimes(Times):
     """At any times, by equal steps from each to the next.
 
     Args:
