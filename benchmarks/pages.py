@@ -181,6 +181,7 @@ def still_water() -> str:
             water += ", disordered" if row["jitter"] else ""
         else:
             water = f"dam break, {row['along']} along the tank, {row['end']:g} s"
+            water += " (films held)" if "films" in row else ""
         lost = row["fault"] is not None
         rows.append((
             water,
@@ -203,7 +204,7 @@ def free_flows() -> str:
         (
             row["scene"],
             str(row["particles"]),
-            row.get("scheme", "delta-plus"),
+            row.get("scheme", "delta-plus") + (" (films held)" if "films" in row else ""),
             row["measure"].replace(" [percent]", ""),
             _error(row),
             density(row),
