@@ -218,6 +218,56 @@ def free_flows() -> str:
     return markdown(header, rows)
 
 
+def _particles(scene: str, size: int, timed: bool) -> str:
+    """Models on moving particles at several numbers of modes."""
+    header = ("scheme", "M", "projection", "velocity", "pressure", "of the projection",
+              "level (peak)", *(("steps of the full model",) if timed else ()))  # fmt: skip
+    rows = [
+        (
+            row["scheme"],
+            str(row["modes"]),
+            row["projection"],
+            *(
+                f"{short(row[f'{name}_peak_percent'])} / {short(row[f'{name}_median_percent'])}"
+                for name in ("velocity", "pressure", "floor_pressure")
+            ),
+            short(row["level_peak_percent"]),
+            *((short(row["seconds_per_step"] / row["full_seconds_per_step"]),) if timed else ()),
+        )
+        for row in sorted(
+            results(f"particle_modes_{scene}_{size}"),
+            key=lambda row: (row["scheme"], row["projection"] != "galerkin", row["modes"]),
+        )
+    ]
+    return markdown(header, rows)
+
+
+def particle_vortex() -> str:
+    """Of the vortex, most rows made on a machine too busy for times."""
+    return _particles("taylor_green", 32, timed=False)
+
+
+def particle_cavity() -> str:
+    """Of the cavity."""
+    return _particles("lid_driven_cavity", 24, timed=True)
+
+
+def versions() -> str:
+    """This version beside an earlier one."""
+    return markdown(
+        ("", "earlier [ms]", "now [ms]", "ratio"),
+        (
+            (
+                row["case"],
+                short(1e3 * row["earlier_seconds"], 3),
+                short(1e3 * row["seconds"], 3),
+                short(row["ratio"], 3),
+            )
+            for row in results("versions")
+        ),
+    )
+
+
 def _error(row: Row) -> str:
     if row["fault"]:
         return f"lost at {short(row['reached'])} s"
@@ -229,7 +279,9 @@ def _error(row: Row) -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
-    for table in (schemes, settled_cavity, still_water, free_flows)
+    for table in (
+        schemes, settled_cavity, still_water, free_flows, particle_vortex, particle_cavity, versions
+    )  # fmt: skip
 }
 
 if __name__ == "__main__":

@@ -3,9 +3,9 @@
     git worktree add ../earlier COMMIT
     python -m benchmarks.versions ../earlier
 
-One delta-plus right-hand side in a periodic box and between walls, a run of tensors, and a sweep of
-ten thousand members: each version is a process of its own, and they are asked in turns. Least
-times, and their ratios.
+One delta-plus right-hand side in a periodic box and between walls, `predict` of tensors for one
+member, and a sweep of ten thousand: each version is a process of its own, and they are asked in
+turns. Least times, and their ratios.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .table import command
 
 ROOT = Path(__file__).parents[1]
 WORKER = Path(__file__).with_name("version_worker.py")
-CASES = ("periodic right-hand side", "walled right-hand side", "run of tensors", "sweep")
+CASES = ("periodic right-hand side", "walled right-hand side", "predict, one member", "sweep")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -51,7 +51,12 @@ def _run(options) -> None:
             before, after = np.min(seconds, axis=0)
             rows.append({"case": case, "earlier_seconds": before, "seconds": after,
                          "ratio": after / before})  # fmt: skip
-    write_json(options.json, {"rows": rows, "environment": environment()})
+    commit = subprocess.run(
+        ["git", "-C", options.earlier, "rev-parse", "--short", "HEAD"],
+        capture_output=True, text=True, check=False,
+    ).stdout.strip()  # fmt: skip
+    results = {"rows": rows, "earlier": commit or "unknown", "environment": environment()}
+    write_json(options.json, results)
     print(format_rows(
         ("case", "earlier ms", "this ms", "ratio"),
         [(row["case"], number(1e3 * row["earlier_seconds"]), number(1e3 * row["seconds"]),
