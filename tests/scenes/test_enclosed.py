@@ -47,6 +47,7 @@ def traced(scene):
 
 def scopes(scene) -> set[str]:
     """All words of the names of operations, and of the functions that made them."""
+    jax.clear_caches()  # a trace that is kept names the scene that it was first made for
     rates, arguments = traced(scene)
     text = jax.jit(rates).lower(*arguments).as_text(debug_info=True)
     names = re.findall(r'loc\("([^"]*)"', text)
