@@ -60,6 +60,7 @@ def small(name):
 def program(scene) -> str:
     neighbors = eqx.filter_eval_shape(scene.search().build, scene.state.position)
     functional = scene.functional()
+    jax.clear_caches()  # a trace that is kept names the scene that it was first made for
     rates = jax.jit(lambda *arguments: functional(*arguments))
     return rates.lower(jnp.zeros(()), scene.state, neighbors).as_text(debug_info=True)
 
