@@ -22,6 +22,7 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap, ShepardMap
 from jaxsph.scenes import lid_driven_cavity
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     ConsistentAdvection,
     Energy,
@@ -66,7 +67,8 @@ def _arguments(add) -> None:
 def _rows(options):
     plan = PLANS["lid-driven-cavity"]
     make = partial(
-        lid_driven_cavity, options.resolution, end_time=options.end_time, dtype="float64"
+        lid_driven_cavity, options.resolution, end_time=options.end_time, scheme=DeltaPlus(),
+        dtype="float64",
     )
     clocked = Clocked()
     for inner_product, advection, rule in CHOICES:

@@ -25,6 +25,7 @@ from jaxsph.environment import environment
 from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph.scenes.taylor_green_solution import kinetic_energy as exact_energy
+from jaxsph.schemes import DeltaPlus
 
 from .measure import (
     format_rows,
@@ -138,6 +139,7 @@ def make_scene(case: dict[str, Any]) -> Scene:
             h_over_dx=case["h_over_dx"],
             end_time=case["end_time"],
             arrangement=arrangement,
+            scheme=DeltaPlus(),
             dtype=case["precision"],
             **settings,
         )

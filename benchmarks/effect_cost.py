@@ -40,6 +40,7 @@ from jaxsph.effects import (
 from jaxsph.environment import environment
 from jaxsph.io import check_target
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .measure import (
     alternate,
@@ -99,7 +100,8 @@ def _arguments(add) -> None:
 
 def measured(resolution: int, h_over_dx: float, repeats: int) -> dict[str, Any]:
     """Times of the bare scene and of each effect on it, all taken in turns."""
-    scene = taylor_green(resolution, h_over_dx=h_over_dx, arrangement=JitteredLattice())
+    scene = taylor_green(resolution, h_over_dx=h_over_dx, arrangement=JitteredLattice(),
+        scheme=DeltaPlus())
     bare = (Continuity(), PressureForce())
     sets = {(): bare}
     for effect, needed in ladder():

@@ -21,6 +21,7 @@ from jaxsph.arrangements import JitteredLattice
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph.sweeps import read_member, sweep
 
 from .measure import format_rows, number, progress, write_json
@@ -54,7 +55,10 @@ def _run(options) -> None:
 def members(count: int, side: int, end_time: float) -> list[Scene]:
     """Scenes at even Reynolds numbers and seeds of their own."""
     return [
-        taylor_green(side, reynolds, end_time=end_time, arrangement=JitteredLattice(seed=seed))
+        taylor_green(
+            side, reynolds, end_time=end_time, arrangement=JitteredLattice(seed=seed),
+            scheme=DeltaPlus(),
+        )
         for seed, reynolds in enumerate(np.linspace(100.0, 400.0, count).tolist())
     ]
 

@@ -29,6 +29,7 @@ from jaxsph.cli import positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, integrate
 from jaxsph.scenes import Scene, lid_driven_cavity, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     ConsistentAdvection,
     Energy,
@@ -119,14 +120,16 @@ def _beside(rows) -> dict[str, Any]:
 
 def periodic(side: int) -> Flow:
     """The Taylor-Green vortex."""
-    scene = taylor_green(side, 100.0, arrangement=JitteredLattice(seed=1))
+    scene = taylor_green(
+        side, 100.0, arrangement=JitteredLattice(seed=1), scheme=DeltaPlus()
+    )
     start = partial(_full_start, scene, scene.state.velocity)
     return Flow("taylor-green", scene, start, scene.model())
 
 
 def walled(side: int) -> Flow:
     """The lid-driven cavity; the velocity field at the start is one vortex."""
-    scene = lid_driven_cavity(side, 100.0, arrangement=Lattice())
+    scene = lid_driven_cavity(side, 100.0, arrangement=Lattice(), scheme=DeltaPlus())
     x, y = np.pi * scene.state.position.T
     vortex = jnp.stack([jnp.sin(x) * jnp.cos(y), -jnp.cos(x) * jnp.sin(y)], axis=1)
     return Flow("lid-driven-cavity", scene, partial(_full_start, scene, vortex), scene.model())
@@ -134,7 +137,9 @@ def walled(side: int) -> Flow:
 
 def reduced(side: int) -> Flow:
     """A reduced model of the vortex on moving particles, M = 5."""
-    scene = taylor_green(side, 100.0, end_time=_TRAINING_TIME, arrangement=Lattice())
+    scene = taylor_green(
+        side, 100.0, end_time=_TRAINING_TIME, arrangement=Lattice(), scheme=DeltaPlus()
+    )
     points = scene.state.position
     snapshots = ReferenceSpace(points, scene.space).snapshots(run_scene(scene))
     basis = pod(snapshots, Energy(), scene.fluid, _MODES)

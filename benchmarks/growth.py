@@ -35,6 +35,7 @@ from jaxsph.integrate import FaultCode, integrate
 from jaxsph.metrics import kinetic_energy
 from jaxsph.plotting import style
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Basis, Energy, Galerkin, LocalSplines, ReducedModel
 from jaxsph_rom.points import PointsModel, QuadraticSystem
 
@@ -203,7 +204,7 @@ def measured(case: Case, repeats: int) -> dict[str, Any]:
 
 
 def _scene(case: Case) -> Scene:
-    kinds = {"arrangement": JitteredLattice(), "dtype": "float64"}
+    kinds = {"arrangement": JitteredLattice(), "scheme": DeltaPlus(), "dtype": "float64"}
     return taylor_green(_side(case.particles), REYNOLDS, h_over_dx=case.h_over_dx, **kinds)
 
 

@@ -20,6 +20,7 @@ import jax
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     FAITHFUL,
     AdjointPetrovGalerkin,
@@ -78,7 +79,8 @@ def _run(options) -> None:
 
     def make(reynolds):
         return taylor_green(
-            options.resolution, reynolds, end_time=options.end_time, dtype="float64"
+            options.resolution, reynolds, end_time=options.end_time, scheme=DeltaPlus(),
+            dtype="float64",
         )
 
     for product in options.inner_product:

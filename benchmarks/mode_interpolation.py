@@ -24,6 +24,7 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import lid_driven_cavity
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Energy, LatticePolynomials, LocalSplines, ReferenceSpace, pod
 from jaxsph_rom.study import full_run
 
@@ -60,7 +61,8 @@ def _arguments(add) -> None:
 
 def _measured(options) -> dict[str, Any]:
     scene = lid_driven_cavity(
-        options.resolution, REYNOLDS, end_time=options.end_time, dtype="float64"
+        options.resolution, REYNOLDS, end_time=options.end_time, scheme=DeltaPlus(),
+        dtype="float64",
     )
     run = full_run(options.out / "full", scene, progress)
     space, points = scene.space, np.asarray(scene.state.position)

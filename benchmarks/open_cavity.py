@@ -13,6 +13,7 @@ walls.
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from jaxsph.environment import environment
 from jaxsph.interpolation import ShepardMap
 from jaxsph.scenes import Scene, open_cavity
 from jaxsph.scenes.open_cavity import CAVITY_LENGTH, CHANNEL_HEIGHT
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom.study import full_run
 
 from .measure import near_walls, number, progress, write_json
@@ -63,15 +65,17 @@ def _arguments(add) -> None:
 
 def _scene(options) -> Scene:
     """The scene with some snapshots a second."""
-    free = open_cavity(options.resolution, options.reynolds, end_time=options.end_time)
-    each = max(1, round(1.0 / (SNAPSHOTS_PER_SECOND * free.time_step)))
-    intervals = int(np.ceil(options.end_time / (each * free.time_step)))
-    scene = open_cavity(
+    make = partial(
+        open_cavity,
         options.resolution,
         options.reynolds,
         end_time=options.end_time,
-        time_step=options.end_time / (each * intervals),
+        scheme=DeltaPlus(),
     )
+    free = make()
+    each = max(1, round(1.0 / (SNAPSHOTS_PER_SECOND * free.time_step)))
+    intervals = int(np.ceil(options.end_time / (each * free.time_step)))
+    scene = make(time_step=options.end_time / (each * intervals))
     return dataclasses.replace(scene, steps_per_snapshot=each)
 
 

@@ -146,6 +146,27 @@ def schemes() -> str:
     return markdown(("", "delta-plus", "s", "consistent", "s"), lines())
 
 
+def scheme_models() -> str:
+    """Reduced models on points of both schemes, the worse of the unseen runs."""
+    rows = results("scheme_models")
+    names = ("velocity_median", "floor_velocity_median", "pressure_median",
+             "floor_pressure_median", "sound")  # fmt: skip
+
+    def lines() -> Iterator[tuple[str, ...]]:
+        for key in dict.fromkeys((r["scene"], r["modes"], r["closure"]) for r in rows):
+            for scheme in ("delta-plus", "consistent"):
+                case = (*key, scheme)
+                found = [
+                    r for r in rows if (r["scene"], r["modes"], r["closure"], r["scheme"]) == case
+                ]
+                worst = (max(r[f"{name}_percent"] for r in found) for name in names)
+                yield (key[0], str(key[1]), key[2], scheme, *map(short, worst))
+
+    header = ("flow", "M", "closure", "scheme", "velocity %", "floor", "pressure %", "floor",
+              "full model's sound %")  # fmt: skip
+    return markdown(header, lines())
+
+
 def settled_cavity() -> str:
     """The cavity in the consistent scheme, run until it is steady."""
     header = ("Re", "particles", "u", "v", "Ghia u", "Ghia v", "last change", "half size, then [s]",
@@ -280,7 +301,8 @@ def _error(row: Row) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
-        schemes, settled_cavity, still_water, free_flows, particle_vortex, particle_cavity, versions
+        schemes, scheme_models, settled_cavity, still_water, free_flows, particle_vortex,
+        particle_cavity, versions,
     )  # fmt: skip
 }
 

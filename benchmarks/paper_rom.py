@@ -29,6 +29,7 @@ from jaxsph.cli import (
 )
 from jaxsph.environment import environment
 from jaxsph.scenes import SCENES
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     FAITHFUL,
     AdjointPetrovGalerkin,
@@ -195,6 +196,7 @@ def _study(options, plan: Plan, clocked: Clocked, projections) -> Study:
         h_over_dx=options.h_over_dx,
         end_time=settings["end_time"],
         arrangement=ARRANGEMENTS[settings["arrangement"]](seed=0),
+        scheme=DeltaPlus(),
         dtype="float64",
     )
     plan = dataclasses.replace(plan, settling=settings.get("settling"))

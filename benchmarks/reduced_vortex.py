@@ -12,6 +12,7 @@ from jaxsph import SimulationError, Trajectory
 from jaxsph.arrangements import Lattice, Stirred
 from jaxsph.metrics import centre_line, probe, relative_discrepancy
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom.points import ReducedFlow
 from jaxsph_rom.study import quiet
 
@@ -32,6 +33,7 @@ def make_scene(options, reynolds: float, time_step: float | None = None) -> Scen
         end_time=options.end_time,
         time_step=time_step,
         arrangement=Stirred(),
+        scheme=DeltaPlus(),
         dtype="float64",
     )
     return quiet(scene)

@@ -26,6 +26,7 @@ from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, rk4_step
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .measure import (
     alternate,
@@ -80,6 +81,7 @@ def measure(options) -> dict[str, Any]:
         scale=options.scale,
         h_over_dx=options.h_over_dx,
         arrangement=ARRANGEMENTS[options.arrangement](seed=0),
+        scheme=DeltaPlus(),
         dtype=options.precision,
     )
     model = scene.model()

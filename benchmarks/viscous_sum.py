@@ -22,6 +22,7 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.effects import LaminarViscosity
 from jaxsph.environment import environment
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .measure import format_rows, number, write_json
 from .table import command
@@ -60,7 +61,8 @@ def _run(options) -> None:
 
 def measure(resolution: int, h_over_dx: float, start: str) -> dict[str, Any]:
     """Ratios of decay rates of one arrangement of particles."""
-    scene = taylor_green(resolution, h_over_dx=h_over_dx, arrangement=STARTS[start])
+    scene = taylor_green(resolution, h_over_dx=h_over_dx, arrangement=STARTS[start],
+        scheme=DeltaPlus())
     functional = SPHFunctional(
         (LaminarViscosity(jnp.asarray(VISCOSITY)),), scene.fluid, scene.mass, scene.space
     )

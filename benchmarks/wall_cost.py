@@ -18,6 +18,7 @@ from jaxsph.arrangements import JitteredLattice
 from jaxsph.cli import positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import lid_driven_cavity, taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .measure import alternate, compiled, format_rows, number, summary, tell, write_json
 from .table import command
@@ -47,10 +48,10 @@ def _run(options) -> None:
 
 def measure(side: int, repeats: int) -> dict[str, Any]:
     """Times of both right-hand sides and of their lists, and their ratios."""
-    arrangement = JitteredLattice(amplitude=0.2)
+    given = {"arrangement": JitteredLattice(amplitude=0.2), "scheme": DeltaPlus()}
     scenes = {
-        "walled": lid_driven_cavity(side, arrangement=arrangement),
-        "periodic": taylor_green(side, h_over_dx=2.0, arrangement=arrangement),
+        "walled": lid_driven_cavity(side, **given),
+        "periodic": taylor_green(side, h_over_dx=2.0, **given),
     }
     searches = {name: scene.search(margin=_MARGIN) for name, scene in scenes.items()}
     room = max(searches["walled"].fluid.capacity, searches["periodic"].capacity)

@@ -28,6 +28,7 @@ from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.metrics import phase_error, probe, relative_discrepancy
 from jaxsph.scenes import SCENES, Scene
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import low_pass
 from jaxsph_rom.points import (
     Compressible,
@@ -139,7 +140,8 @@ def _run(options) -> None:
 def _maker(options, folder: Path) -> Family:
     """The scenes of any Reynolds number, settled first where the plan says so."""
     plan = PLANS[options.scene]
-    settings = {"scale": options.scale, "resolution": options.resolution, "dtype": "float64"}
+    settings = {"scale": options.scale, "resolution": options.resolution, "scheme": DeltaPlus(),
+                "dtype": "float64"}  # fmt: skip
     if options.end_time is not None:
         settings["end_time"] = options.end_time
     scene = partial(SCENES[options.scene], **settings)

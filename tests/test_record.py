@@ -62,7 +62,7 @@ def test_what_this_library_offers_has_its_short_name():
     assert record(WendlandC4()) == "WendlandC4"
     assert JitteredLattice(seed=2).record()["rule"] == "JitteredLattice"
     parameters = lid_driven_cavity(16).parameters
-    assert (parameters["kernel"], parameters["scheme"]) == ("WendlandC2", "DeltaPlus")
+    assert (parameters["kernel"], parameters["scheme"]) == ("WendlandC2", "Consistent")
     assert restored("WendlandC4", Kernel, kernels) == WendlandC4()
 
 

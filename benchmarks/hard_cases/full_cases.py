@@ -34,7 +34,8 @@ def _vortex(
     resolution: int, reynolds: float, end_time: float, arrangement: Arrangement, precision: str
 ) -> Run:
     scene = taylor_green(
-        resolution, reynolds, end_time=end_time, arrangement=arrangement, dtype=precision
+        resolution, reynolds, end_time=end_time, arrangement=arrangement, scheme=DeltaPlus(),
+        dtype=precision,
     )
     return Run(scene, about(scene, 50))
 
@@ -53,7 +54,9 @@ def _with_effect(run: Run, effect: Effect) -> Run:
 
 
 def _cavity(resolution: int, reynolds: float, end_time: float, precision: str) -> Run:
-    scene = lid_driven_cavity(resolution, reynolds, end_time=end_time, dtype=precision)
+    scene = lid_driven_cavity(
+        resolution, reynolds, end_time=end_time, scheme=DeltaPlus(), dtype=precision
+    )
     return Run(scene, about(scene, 50))
 
 
@@ -71,7 +74,7 @@ def _tank(resolution: int, end_time: float, precision: str) -> Run:
 
 
 def _open_cavity(resolution: int, end_time: float) -> Run:
-    scene = open_cavity(resolution, end_time=end_time, dtype="float64")
+    scene = open_cavity(resolution, end_time=end_time, scheme=DeltaPlus(), dtype="float64")
     return Run(scene, about(scene, 200))
 
 
@@ -87,7 +90,9 @@ def every(scene: Scene, steps: int) -> Schedule:
 
 def _courant_vortex(courant: float) -> Run:
     """A vortex whose scene is built with the step C h / c0."""
-    scene = taylor_green(24, end_time=1.0, time_step=_step(2.0 / 24, courant), dtype="float64")
+    scene = taylor_green(
+        24, end_time=1.0, time_step=_step(2.0 / 24, courant), scheme=DeltaPlus(), dtype="float64"
+    )
     return Run(scene, every(scene, 10))
 
 
@@ -102,11 +107,11 @@ def _step(smoothing_length: float, courant: float) -> float:
 
 
 def _beyond_vortex(courant: float) -> Run:
-    return _driven_beyond(taylor_green(24, dtype="float64"), courant)
+    return _driven_beyond(taylor_green(24, scheme=DeltaPlus(), dtype="float64"), courant)
 
 
 def _beyond_cavity(courant: float) -> Run:
-    return _driven_beyond(lid_driven_cavity(16, dtype="float64"), courant)
+    return _driven_beyond(lid_driven_cavity(16, scheme=DeltaPlus(), dtype="float64"), courant)
 
 
 def _vortex_case(

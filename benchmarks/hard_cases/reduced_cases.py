@@ -12,6 +12,7 @@ from jaxtyping import Float
 from jaxsph import Trajectory, run_scene
 from jaxsph.integrate import FaultCode
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     AdjointPetrovGalerkin,
     Basis,
@@ -42,7 +43,7 @@ Snapshots = Float[np.ndarray, "points fields times"]
 @cache
 def full_run() -> tuple[Scene, Trajectory]:
     """The run that all bases are made of: 16 x 16, Re = 100, 21 snapshots to 0.4 s."""
-    scene = taylor_green(16, end_time=0.4, dtype="float64")
+    scene = taylor_green(16, end_time=0.4, scheme=DeltaPlus(), dtype="float64")
     return scene, run_scene(scene)
 
 

@@ -14,6 +14,7 @@ from jaxsph.arrangements import Lattice
 from jaxsph.integrate import FaultCode
 from jaxsph.scenes import Scene, taylor_green
 from jaxsph.scenes.taylor_green import REFERENCE_DENSITY
+from jaxsph.schemes import DeltaPlus
 
 from .bounds import (
     AT_REST,
@@ -36,7 +37,7 @@ def _with(scene: Scene, position, velocity, density) -> Run:
 
 
 def _vortex() -> Scene:
-    return taylor_green(16, end_time=0.5, dtype="float64")
+    return taylor_green(16, end_time=0.5, scheme=DeltaPlus(), dtype="float64")
 
 
 def _at_rest(position: Array) -> tuple[Array, Array, Array]:
@@ -95,7 +96,9 @@ def random_start(position: Float[np.ndarray, "particles dim"]) -> Run:
     Args:
         position: of `RANDOM_PARTICLES` particles [m].
     """
-    base = taylor_green(8, h_over_dx=1.2, end_time=0.5, arrangement=Lattice(), dtype="float64")
+    base = taylor_green(
+        8, h_over_dx=1.2, end_time=0.5, arrangement=Lattice(), scheme=DeltaPlus(), dtype="float64"
+    )
     run = _with(base, *_at_rest(jnp.asarray(position)))
     found = base.search()
     # capacities do not depend on where particles are, so that one program serves all starts

@@ -14,6 +14,7 @@ from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.integrate import integrate
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import (
     AdjointPetrovGalerkin,
     ConsistentAdvection,
@@ -41,7 +42,8 @@ def solve(
     """
 
     def make(reynolds):
-        return taylor_green(side, reynolds, end_time=end_time, arrangement=Lattice())
+        given = {"arrangement": Lattice(), "scheme": DeltaPlus()}
+        return taylor_green(side, reynolds, end_time=end_time, **given)
 
     parameters = [{"reynolds": 100.0}, {"reynolds": 200.0}]
     scenes = [make(**named) for named in parameters]

@@ -11,6 +11,7 @@ import optax
 from jaxsph import run_scene
 from jaxsph.arrangements import Stirred
 from jaxsph.scenes import balanced, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom.points import Family, LinearClosure, train
 
 from .problem import descend, noisy
@@ -30,7 +31,9 @@ def solve(
 
     def make(reynolds):
         return balanced(
-            taylor_green(side, reynolds, end_time=end_time, arrangement=Stirred(seed=0))
+            taylor_green(
+                side, reynolds, end_time=end_time, arrangement=Stirred(seed=0), scheme=DeltaPlus()
+            )
         )
 
     closure = LinearClosure(iterations=iterations)

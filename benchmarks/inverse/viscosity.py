@@ -11,6 +11,7 @@ import optax
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.effects import LaminarViscosity
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .problem import descend, grid, noisy, probes_of, run
 
@@ -22,7 +23,10 @@ def solve(
 ) -> dict[str, Any]:
     """L-BFGS on log nu; data of a run with other particles, noise relative to its largest."""
     scenes = [
-        taylor_green(side, reynolds, end_time=end_time, arrangement=JitteredLattice(seed=seed))
+        taylor_green(
+            side, reynolds, end_time=end_time, arrangement=JitteredLattice(seed=seed),
+            scheme=DeltaPlus(),
+        )
         for seed, reynolds in enumerate((REYNOLDS, FIRST_GUESS))
     ]
     measure = probes_of(grid(scenes[0].space, probes), scenes[0].space)

@@ -16,6 +16,7 @@ from jaxsph.effects import Continuity, IsotropicViscosity, PressureForce
 from jaxsph.environment import versions
 from jaxsph.integrate import FaultCode, integrate
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from .protocol import PLAIN, Case, Side, serve
 
@@ -109,6 +110,7 @@ def _scene(case: Case):
         h_over_dx=case.h_over_dx,
         end_time=case.end_time,
         arrangement=Lattice(),
+        scheme=DeltaPlus(),
         mach=case.mach,
     )
     state = ParticleState(*map(jnp.asarray, (case.position, case.velocity, case.density)))

@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.scenes import Scene, taylor_green
+from jaxsph.schemes import DeltaPlus
 
 from ..measure import interacting_pairs, progress, summary, tell
 from .protocol import PLAIN
@@ -44,7 +45,8 @@ def speed_row(
 
 def make_scene(resolution: int, h_over_dx: float, reynolds: float, arrangement) -> Scene:
     """The vortex whose particles all codes start from."""
-    return taylor_green(resolution, reynolds, h_over_dx=h_over_dx, arrangement=arrangement)
+    return taylor_green(resolution, reynolds, h_over_dx=h_over_dx, arrangement=arrangement,
+        scheme=DeltaPlus())
 
 
 def write_case(folder: Path, scene: Scene, scheme: str, end_time: float, slices: int) -> dict:

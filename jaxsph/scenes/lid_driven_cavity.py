@@ -8,7 +8,7 @@ import numpy as np
 from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
-from ..schemes import DeltaPlus, Scheme
+from ..schemes import Scheme
 from ..walls import BoxRegion, MovingWall
 from .composed import pick_scale, positive
 from .enclosed import enclosed_flow
@@ -66,7 +66,7 @@ def lid_driven_cavity(
         layers: of ghosts; a full support's if none is given (the paper has three).
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -97,7 +97,7 @@ def lid_driven_cavity(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
-        scheme=DeltaPlus() if scheme is None else scheme,
+        scheme=scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds, "lid": lid},
     )

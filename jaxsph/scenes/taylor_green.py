@@ -6,7 +6,7 @@ from ..arrangements import Arrangement
 from ..domain import Box
 from ..kernels import Kernel
 from ..record import record
-from ..schemes import Consistent, DeltaPlus, Scheme
+from ..schemes import Consistent, Scheme
 from . import taylor_green_solution as exact
 from .composed import composed, pick_scale, positive
 from .scales import Scale
@@ -54,7 +54,7 @@ def taylor_green(
         end_time: [s].
         arrangement: how particles start; packed if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `DeltaPlus()` if none is given.
+        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         mach: Mach number U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -78,8 +78,7 @@ def taylor_green_3d(
     mach: float = 0.1,
     dtype=None,
 ) -> Scene:
-    """The Taylor-Green vortex on the periodic unit cube; arguments as `taylor_green`, but that the
-    scheme is `Consistent()` if none is given."""
+    """The Taylor-Green vortex on the periodic unit cube; arguments as `taylor_green`."""
     return _vortex("taylor-green-3d", 3, SCALES_3D, **locals())
 
 
@@ -92,7 +91,7 @@ def _vortex(
     viscosity, density = 1.0 / reynolds, REFERENCE_DENSITY
     vortex = exact.DecayingVortex(viscosity, density) if dim == 2 else None
     if scheme is None:
-        scheme = DeltaPlus() if dim == 2 else Consistent()
+        scheme = Consistent()
 
     def velocity(position):
         return vortex(position, 0.0)[0] if dim == 2 else exact.initial_velocity_3d(position)

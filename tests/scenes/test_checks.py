@@ -10,7 +10,7 @@ import pytest
 
 from jaxsph import BallRegion, Box, Fluid, ParticleState, Space, Walls, run_scene
 from jaxsph.arrangements import Lattice
-from jaxsph.effects import Gravity, LaminarViscosity
+from jaxsph.effects import ConsistentViscosity, Gravity
 from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene, hydrostatic_tank, taylor_green
 from jaxsph.schemes import DeltaPlus
@@ -51,7 +51,7 @@ def test_numbers_of_numpy_are_taken_into_the_particles_precision():
 
 def test_an_effect_put_into_a_functional_takes_its_precision():
     functional = taylor_green(12, arrangement=Lattice(), dtype=jnp.float32).functional()
-    changed = functional.with_effect(LaminarViscosity(np.float64(0.3)))
+    changed = functional.with_effect(ConsistentViscosity(np.float64(0.3)))
     assert changed.effects[2].viscosity.dtype == jnp.float32
 
 

@@ -12,6 +12,7 @@ from jaxsph import Fluid
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import DensityDiffusion, Effect, Gravity, LaminarViscosity
 from jaxsph.scenes import lid_driven_cavity, taylor_green
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Energy, pod
 from jaxsph_rom.points import Coefficients, EulerianRates, ReferenceOperators
 from jaxsph_rom.points.dynamics.fixed_points import on_points
@@ -30,7 +31,7 @@ class Pull(Effect):
 
 @cache
 def cavity():
-    return lid_driven_cavity(12, 100.0)
+    return lid_driven_cavity(12, 100.0, scheme=DeltaPlus())
 
 
 def scene_of(viscosity, sound, lid, pull, delta=0.1, kind=Pull):

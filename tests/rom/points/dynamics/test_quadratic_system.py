@@ -40,7 +40,7 @@ def random_basis(scene, modes=4, seed=0):
 
 @pytest.fixture(scope="module")
 def vortex():
-    return taylor_green(16, 100.0, arrangement=Lattice())
+    return taylor_green(16, 100.0, arrangement=Lattice(), scheme=DeltaPlus())
 
 
 @pytest.fixture(scope="module")

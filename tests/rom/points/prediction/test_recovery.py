@@ -8,6 +8,7 @@ import pytest
 
 from jaxsph.integrate import integrate
 from jaxsph.scenes import lid_driven_cavity
+from jaxsph.schemes import DeltaPlus
 from jaxsph_rom import Energy
 from jaxsph_rom.points import (
     Compressible,
@@ -84,7 +85,7 @@ def cavity():
 
 
 def cavity_of(reynolds):
-    return lid_driven_cavity(10, reynolds, end_time=0.4)
+    return lid_driven_cavity(10, reynolds, end_time=0.4, scheme=DeltaPlus())
 
 
 def test_a_flow_between_walls_is_solenoidal_and_follows_its_runs(cavity):

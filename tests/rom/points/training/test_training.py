@@ -17,7 +17,7 @@ from jaxsph.effects import Effect, Gravity, LaminarViscosity
 from jaxsph.fluid import TaitEquationOfState
 from jaxsph.kernels import WendlandC2, WendlandC4
 from jaxsph.scenes import couette, poiseuille, taylor_green
-from jaxsph.schemes import Consistent
+from jaxsph.schemes import Consistent, DeltaPlus
 from jaxsph_rom.points import FlowFileError
 from jaxsph_rom.points.training.belonging import check_runs
 
@@ -31,7 +31,7 @@ POINTS = [
 
 def make(viscosity, force, own=(), side=12, **settings):
     """A vortex that a force sets in motion."""
-    settings = {"end_time": 0.1, "arrangement": Lattice(), **settings}
+    settings = {"end_time": 0.1, "arrangement": Lattice(), "scheme": DeltaPlus(), **settings}
     scene = taylor_green(side, **settings)
     others = [e for e in scene.effects if not isinstance(e, LaminarViscosity)]
     mine = (LaminarViscosity(jnp.asarray(viscosity)), Gravity(jnp.asarray([force, 0.0])), *own)
@@ -60,7 +60,7 @@ def test_what_depends_on_the_parameters_is_found(trained):
 def test_what_is_compiled_serves_all_numbers_of_modes(trained, runs, caplog):
     with jax.log_compiles():
         jaxsph_rom.train(make, POINTS, modes=4, runs=runs)
-    compiled = set(re.findall(r"Finished XLA compilation of jit\((\w+)\)", caplog.text))
+    compiled = set(re.findall(r"Compiling jit\((\w+)\)", caplog.text))
     assert "_tested" in compiled  # it takes the modes themselves
     assert not compiled & {"along", "compose", "_rates_by_effect"}, compiled
 
