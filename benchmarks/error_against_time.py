@@ -218,11 +218,11 @@ def _offline(family: str, trained: TrainedModel, runs, row) -> dict[str, Any]:
     """What a model cost before its first run, and after how many runs that is paid back."""
     training = trained.training
     parts = {
-        "full_runs_s": sum(r.metadata["run_seconds"] for r in runs),
+        "full_runs_s": sum(r.timing.run_seconds for r in runs),
         "training_s": training["offline_seconds"],
         "closure_s": training.get("closure_seconds", 0.0),
     }
-    saved = runs[0].metadata["run_seconds"] - row["seconds"]
+    saved = runs[0].timing.run_seconds - row["seconds"]
     paid_back = math.ceil(sum(parts.values()) / saved) if saved > 0.0 else None
     return {"family": family, "modes": row["modes"], **parts, "paid_back_after_runs": paid_back}
 
@@ -248,7 +248,7 @@ def equal_error(row: dict[str, Any], rows: list[dict[str, Any]]) -> dict[str, An
 
 
 def _seconds(scene: Scene, run: Trajectory) -> float:
-    return run.metadata["run_seconds"] * scene.steps / run.metadata["steps"]
+    return run.timing.seconds(scene.steps)
 
 
 def figure(rows: list[dict[str, Any]], path: Path) -> Path:

@@ -118,7 +118,7 @@ def _judged(trained: TrainedModel, scene: Scene, run: Trajectory, until: float) 
         "stable": int(prediction.status[0]) == 0,
         "reduced_seconds": prediction.run_seconds,
         "reduced_seconds_with_compilation": first,
-        "full_seconds": run.metadata["run_seconds"] * scene.steps / run.metadata["steps"],
+        "full_seconds": run.timing.seconds(scene.steps),
     }
     truth, line = profile_of(scene, run), centre_line(scene.space)
     projected = flow.project(mapped_run(flow.reference, run, scene.fluid))

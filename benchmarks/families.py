@@ -133,7 +133,7 @@ def _row(trained: jaxsph_rom.TrainedModel, point, scene: Scene, full) -> dict[st
         "floor": velocity_error(trained.flow, projected, mapped[:, 1:]),
         "expected": float(prediction.error_indicator[0]) if stable else None,
         "start": prediction.start,
-        "full_seconds": full.metadata["run_seconds"],
+        "full_seconds": full.timing.run_seconds,
         "reduced_seconds": prediction.run_seconds,
     }
 

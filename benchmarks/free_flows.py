@@ -121,11 +121,10 @@ def run(name: str, resolution: int, scheme: str) -> dict[str, Any]:
             )
         except SimulationError as error:
             fault, trajectory = str(error), error.trajectory
-    timings = trajectory.metadata
     row |= {
         "fault": fault,
-        "seconds": timings["run_seconds"],
-        "compile_seconds": timings["compile_seconds"],
+        "seconds": trajectory.timing.run_seconds,
+        "compile_seconds": trajectory.timing.compile_seconds,
         "reached": float(trajectory.time[-1]),
         **_common(scene, trajectory),
     }

@@ -91,8 +91,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         "nearest_over_dx": float(nearest),
         "particles": trajectory.particles,
         "steps": scene.steps,
-        "seconds": trajectory.metadata.get("run_seconds"),
-        "compile_seconds": trajectory.metadata.get("compile_seconds"),
+        "seconds": trajectory.timing.run_seconds,
+        "compile_seconds": trajectory.timing.compile_seconds,
     }
 
 

@@ -73,8 +73,8 @@ def measured(scenes: list[Scene], path: Path) -> dict[str, Any]:
     with progress("alone", len(scenes)) as report:
         for k, scene in enumerate(scenes):
             single, member = run_scene(scene), read_member(path, k)
-            alone += single.metadata["run_seconds"]
-            compiling += single.metadata["compile_seconds"]
+            alone += single.timing.run_seconds
+            compiling += single.timing.compile_seconds
             for name in _FIELDS:
                 one, other = getattr(single, name), getattr(member, name)
                 apart = float(np.abs(one - other).max() / np.abs(one).max())

@@ -109,7 +109,7 @@ def _run(options) -> None:
         "trained_on": TRAINED_ON,
         "step": scene.time_step,
         "judged_every": stride * scene.time_step,
-        "fom_seconds": run.metadata["run_seconds"] * scene.steps / run.metadata["steps"],
+        "fom_seconds": run.timing.seconds(scene.steps),
         "device": jax.devices()[0].device_kind,
         "environment": environment(),
     }

@@ -111,15 +111,15 @@ def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
         scene = with_record(scene, before=case["before"])
         scene = continued(scene, before.state(-1), coarse.space)
     trajectory = full_run(_folder(folder, case), scene, progress)
-    metadata = trajectory.metadata
+    timing = trajectory.timing
     return {
         **near_walls(scene, trajectory),
         **_errors(case, scene, trajectory),
         "fault": None,
         # of a run taken up again, extrapolated from its last part
-        "seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
-        "seconds_before": 0.0 if before is None else before.metadata["run_seconds"],
-        "compile_seconds": metadata["compile_seconds"],
+        "seconds": timing.seconds(scene.steps),
+        "seconds_before": 0.0 if before is None else before.timing.run_seconds,
+        "compile_seconds": timing.compile_seconds,
         "steps": scene.steps,
         "time_step": scene.time_step,
         "dx": scene.space.spacing,

@@ -89,7 +89,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     frequency = dominant_frequency(trajectory.time[late], mouth[late])
     sampled = trajectory.time >= trajectory.time[-1] - SAMPLED
     speed = float(bulk[sampled].mean())
-    metadata = trajectory.metadata
+    timing = trajectory.timing
     return {
         "bulk_velocity": speed,
         "nominal_reynolds": viscosity[0],
@@ -107,8 +107,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "bulk_velocity_over_time": bulk,
         "kinetic_energy_per_mass_over_time": energy,
         "mouth_velocity_over_time": mouth,
-        "seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
-        "compile_seconds": metadata["compile_seconds"],
+        "seconds": timing.seconds(scene.steps),
+        "compile_seconds": timing.compile_seconds,
         "steps": scene.steps,
         "particles": trajectory.particles,
         "parameters": scene.parameters,

@@ -61,13 +61,13 @@ def judged(flow: ReducedFlow, scene: Scene, run: Trajectory, projected, truth) -
         )
     except SimulationError as error:
         fault = str(error)
-    metadata = run.metadata
+    timing = run.timing
     row = {
         "stable": fault is None,
         "fault": fault,
         "rom_compile_and_first_seconds": first_seconds,
         "rom_seconds": summary(seconds),
-        "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
+        "fom_seconds": timing.seconds(scene.steps),
         "steps": scene.steps,
     }
     line = centre_line(scene.space)

@@ -178,8 +178,8 @@ def _short_run(scene: Scene, steps: int) -> dict[str, Any] | None:
     tell(f"running {steps} steps")
     schedule = replace(scene.schedule, intervals=steps // scene.steps_per_snapshot)
     trajectory = simulate(scene.model(), scene.state, schedule)
-    seconds = trajectory.metadata["run_seconds"]
-    compile_seconds = trajectory.metadata["compile_seconds"]
+    seconds = trajectory.timing.run_seconds
+    compile_seconds = trajectory.timing.compile_seconds
     return {
         "steps": steps,
         "seconds_per_step": seconds / steps,

@@ -94,7 +94,7 @@ def _run(options) -> None:
     kept.results |= {
         "particles": run.particles,
         "points": len(rates.points),
-        "fom_seconds": run.metadata["run_seconds"] * scene.steps / run.metadata["steps"],
+        "fom_seconds": run.timing.seconds(scene.steps),
         "full_rates_ms": 1e3 * _seconds_of_rates(rates),
         "steps": scene.steps,
         "parameters": scene.parameters,

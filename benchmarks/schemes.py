@@ -127,8 +127,8 @@ def run(case: dict[str, Any], scheme: str) -> dict[str, Any]:
         "largest_energy_over_start": _energy(scene, trajectory),
         "particles": trajectory.particles,
         "steps": scene.steps,
-        "seconds": trajectory.metadata.get("run_seconds"),
-        "compile_seconds": trajectory.metadata.get("compile_seconds"),
+        "seconds": trajectory.timing.run_seconds,
+        "compile_seconds": trajectory.timing.compile_seconds,
     }
 
 

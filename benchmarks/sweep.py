@@ -139,7 +139,7 @@ def _judged(trained: TrainedModel, scene: Scene, run: Trajectory) -> dict[str, A
 
 
 def _seconds(scene: Scene, run: Trajectory) -> float:
-    return run.metadata["run_seconds"] * scene.steps / run.metadata["steps"]
+    return run.timing.seconds(scene.steps)
 
 
 def _table(results: dict[str, Any]) -> str:

@@ -194,12 +194,12 @@ def _judged(
         found, _, seconds = repeated(lambda: flow.predict(projected[0], *arguments), _REPEATS)
     except SimulationError as error:
         fault = str(error)
-    metadata = run.metadata
+    timing = run.timing
     row = {
         "stable": fault is None,
         "fault": fault,
         "rom_seconds": summary(seconds),
-        "fom_seconds": metadata["run_seconds"] * scene.steps / metadata["steps"],
+        "fom_seconds": timing.seconds(scene.steps),
         "steps": scene.steps,
     }
     late = run.time >= judged_from

@@ -39,6 +39,7 @@ from .simulate import simulate as simulate
 from .sweeps import read_member as read_member
 from .sweeps import read_status as read_status
 from .sweeps import sweep as sweep
+from .timing import Timing as Timing
 from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
 from .vector import Vector as Vector

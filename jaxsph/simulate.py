@@ -24,6 +24,7 @@ from .integrate import (
     integrate,
 )
 from .schedule import Schedule
+from .timing import Timing
 from .trajectory import Snapshot, Trajectory
 
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
@@ -111,13 +112,9 @@ def simulate(
 
     def trajectory():
         stacked = jax.tree.map(lambda *a: np.stack(a), *records)
-        timings = {
-            "steps": step - first_step,
-            "time_step": time_step,
-            "run_seconds": run_seconds,
-            "compile_seconds": compile_seconds,
-            "enlarged_at": enlarged_at,
-        }
+        took = Timing(
+            step - first_step, time_step, run_seconds, compile_seconds, tuple(enlarged_at)
+        )
         return Trajectory(
             time=np.asarray(times),
             position=stacked.position,
@@ -125,7 +122,7 @@ def simulate(
             density=stacked.density,
             pressure=stacked.pressure,
             coordinates=stacked.coordinates,
-            metadata={**(metadata or {}), **timings},
+            metadata={**(metadata or {}), **took.metadata()},
         )
 
     compile_seconds, run_seconds, step = 0.0, 0.0, first_step

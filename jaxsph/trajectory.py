@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 
 from .particles import ParticleState
 from .shown import concrete, line, spread, table
+from .timing import Timing
 
 
 class Snapshot(eqx.Module):
@@ -38,7 +39,7 @@ class Trajectory(eqx.Module):
         position, velocity: (S, N, n) [m], [m/s].
         density, pressure: (S, N) [kg/m^3], [Pa].
         coordinates: (S, M) of a reduced model, else None.
-        metadata: scene, parameters, time step, timings; JSON-like.
+        metadata: scene, parameters, and what the run took; JSON-like.
     """
 
     time: Float[np.ndarray, " times"]
@@ -52,6 +53,15 @@ class Trajectory(eqx.Module):
     @property
     def particles(self) -> int:
         return self.position.shape[1]
+
+    @property
+    def timing(self) -> Timing:
+        """What the run took.
+
+        Raises:
+            ValueError: if `metadata` are not those of a run.
+        """
+        return Timing.of(self.metadata)
 
     def nearest(self, time: float) -> int:
         """The number of the snapshot nearest to a time [s]."""

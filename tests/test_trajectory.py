@@ -1,5 +1,6 @@
 """Trajectories: shown, drawn, written, and handed on as labelled arrays."""
 
+import dataclasses
 import sys
 
 import jax
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from jaxsph import Trajectory
+from jaxsph import Timing, Trajectory
 from jaxsph.io import TrajectoryFileError, read_checkpoint, read_overview, read_trajectory
 from jaxsph.plotting import FIELDS, animate
 from tests.runs import random_run
@@ -41,6 +42,16 @@ def test_shown_in_words(tmp_path):
     assert table.startswith("<table>") and table.count("<tr>") == table.count("</tr>") == 6
     found.velocity[2, 3] = np.nan
     assert "1 not finite" in repr(found)
+
+
+def test_what_the_run_took(tmp_path):
+    took = Timing(4, 0.02, 3.0, 1.0, enlarged_at=(2,))
+    found = dataclasses.replace(run(tmp_path / "t.h5"), metadata=took.metadata())
+    assert found.timing == took and found.timing.seconds(8) == 6.0
+    save_again = read_trajectory(found.save(tmp_path / "again.h5"))
+    assert save_again.timing == took
+    with pytest.raises(ValueError, match="metadata: no steps, time_step, run_seconds"):
+        _ = dataclasses.replace(found, metadata={}).timing
 
 
 def test_names_are_no_markup(tmp_path):

@@ -73,7 +73,7 @@ def solve(
         * float(np.abs(apart).max() / np.abs(observed).max()),
         "seconds": descent.seconds,
         "compile_seconds": descent.compile_seconds,
-        "full_run_seconds": verified.metadata["run_seconds"],
+        "full_run_seconds": verified.timing.run_seconds,
         "offline_seconds": trained.training["offline_seconds"]
         + trained.training["closure_seconds"]
         + trained.training["full_seconds"],

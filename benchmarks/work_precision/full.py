@@ -36,11 +36,11 @@ def run_full(name: str, case: Case, setting: FullSetting, folder: Path) -> dict[
         scene = make_scene(name, case, setting, case.reynolds)
         made = clock.perf_counter() - start
         run = _run(scene, setting, clocked)
-        compile_seconds = run.metadata["compile_seconds"]
-        repeats = _AGAIN if run.metadata["run_seconds"] < _CHEAP else 0
+        compile_seconds = run.timing.compile_seconds
+        repeats = _AGAIN if run.timing.run_seconds < _CHEAP else 0
         for number in range(1 + repeats):
             run = _run(scene, setting, clocked) if number else run
-            seconds.append(run.metadata["run_seconds"])
+            seconds.append(run.timing.run_seconds)
             by_step += clocked.take()
     return {
         **errors(case, scene, run),
@@ -82,7 +82,7 @@ def training_runs(
     except SimulationError as error:
         raise ValueError(f"training run: {error}") from None
     seconds = sum(
-        run.metadata["run_seconds"] * scenes[re].steps / run.metadata["steps"]
+        run.timing.seconds(scenes[re].steps)
         for re, run in runs.items()
     )
     return scenes, runs, seconds

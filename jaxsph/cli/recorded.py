@@ -96,19 +96,19 @@ def _holds(writer: TrajectoryWriter) -> str:
 
 
 def _results(scene: Scene, trajectory: Trajectory, path: Path) -> dict[str, Any]:
-    metadata = trajectory.metadata
-    work = trajectory.particles * metadata["steps"]
+    timing = trajectory.timing
+    work = trajectory.particles * timing.steps
     return {
         "scene": scene.name,
         "parameters": scene.parameters,
         "dtype": str(trajectory.position.dtype),
         "particles": trajectory.particles,
-        "steps": metadata["steps"],
-        "first_step": metadata.get("resumed_from_step", 0),
+        "steps": timing.steps,
+        "first_step": trajectory.metadata.get("resumed_from_step", 0),
         "end_time": float(trajectory.time[-1]),
-        "run_seconds": metadata["run_seconds"],
-        "compile_seconds": metadata["compile_seconds"],
-        "microseconds_per_particle_and_step": 1e6 * metadata["run_seconds"] / work,
+        "run_seconds": timing.run_seconds,
+        "compile_seconds": timing.compile_seconds,
+        "microseconds_per_particle_and_step": 1e6 * timing.run_seconds / work,
         "errors": _errors(scene, trajectory),
         "trajectory": str(path),
     }

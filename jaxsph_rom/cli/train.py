@@ -144,7 +144,7 @@ def _closure(options, parameters) -> LinearClosure | None:
 def _seconds(scenes: list[Scene], runs: list[Trajectory]) -> float:
     """Run time of all full runs [s], also where a run was taken up again."""
     return sum(
-        run.metadata["run_seconds"] * scene.steps / run.metadata["steps"]
+        run.timing.seconds(scene.steps)
         for scene, run in zip(scenes, runs, strict=True)
     )
 

@@ -25,7 +25,7 @@ from ..projection import AdjointPetrovGalerkin, Galerkin, MemoryLength, Projecti
 from ..splines import LocalSplines
 from .full_runs import FullRuns
 from .method import Experiment, Method, ModelBasis, ReducedRun
-from .recorded_run import whole_run, with_record
+from .recorded_run import with_record
 
 
 @final
@@ -153,7 +153,7 @@ class OnParticles(Method):
         told |= {
             "memory": None if rule is None else rule.label,
             "hyper": "none",
-            "rom_seconds": whole_run(run, scene.steps) if fault is None else None,
+            "rom_seconds": run.timing.seconds(scene.steps) if fault is None else None,
             "rom_compile_seconds": run.metadata.get("compile_seconds"),
         }
         profile = probe(run, runs.probes(reynolds), scene.space)

@@ -37,12 +37,6 @@ def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
     )
 
 
-def whole_run(trajectory: Trajectory, steps: int) -> float:
-    """Run time [s], extrapolated from the last part of a run that was taken up again."""
-    metadata = trajectory.metadata
-    return metadata["run_seconds"] * steps / metadata["steps"]
-
-
 def with_record(scene: Scene, **settings: Any) -> Scene:
     """The scene with more settings in its recorded parameters."""
     return dataclasses.replace(scene, parameters={**scene.parameters, **settings})

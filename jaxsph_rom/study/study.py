@@ -16,7 +16,7 @@ from ..report import Case
 from .full_runs import FullRuns
 from .method import Experiment, Method, ModelBasis, ReducedRun
 from .on_particles import OnParticles
-from .recorded_run import Progress, whole_run
+from .recorded_run import Progress
 
 _UNIFORM = 1e-6  # of the largest spread over the probes that a field has at any time
 
@@ -110,10 +110,10 @@ class Study:
             pressure_peak_percent=float(percent[1][judged].max()),
             pressure_median_percent=float(np.median(percent[1][judged])),
             stable=fault is None,
-            fom_seconds=whole_run(full, scene.steps),
+            fom_seconds=full.timing.seconds(scene.steps),
             fom_steps=scene.steps,
             rom_steps=scene.steps if fault is None else fault.step,
-            fom_compile_seconds=full.metadata["compile_seconds"],
+            fom_compile_seconds=full.timing.compile_seconds,
             compression_factor=full.particles * (2 * scene.space.box.dim + 1) / run.told["modes"],
             fault=None if fault is None else str(fault),
             fault_time=None if fault is None else fault.step * scene.time_step,

@@ -174,11 +174,9 @@ def _full_seconds(runs: Sequence[Trajectory]) -> float | None:
     """Run time of all full runs [s], also where one was taken up again; None if it is not known."""
     seconds = 0.0
     for run in runs:
-        known = run.metadata
-        if not {"run_seconds", "steps", "time_step"} <= known.keys():
+        if "run_seconds" not in run.metadata:
             return None
-        done = known["steps"] * known["time_step"]
-        seconds += known["run_seconds"] * float(run.time[-1]) / done
+        seconds += run.timing.seconds(round(float(run.time[-1]) / run.timing.time_step))
     return seconds
 
 
