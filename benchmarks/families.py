@@ -206,8 +206,8 @@ median and the largest inside the range, the median outside; the floor is that o
 alone. The rank correlation is Spearman's, of the error that a prediction expects of itself
 (`error_indicator`) with its true one; beside it stands their ratio, its median and in brackets
 where the middle 80 % lie. Break-even is the number of full runs that training is worth, its own
-full runs, closure and compilation in it; its times are of a machine shared with other work, most
-of training is compilation there, and a full run takes a few seconds.
+full runs, closure and compilation in it: most of training is compilation at this size, and a full
+run takes a second or two.
 
 {table}
 """
