@@ -47,7 +47,7 @@ def replaced(**fields):
         (lambda: changed(lambda s: s.fluid.equation_of_state, TaitEquationOfState()),
          "fluid.equation_of_state is jaxsph.fluid.LinearEquationOfState there"),
         (lambda: replaced(effects=(*vortex().effects, Gravity(jnp.array([0.0, -1.0])))),
-         "effects[6] is missing there"),
+         "effects[7] is missing there"),
         (lambda: replaced(space=dataclasses.replace(vortex().space, kernel=WendlandC4())),
          "space.kernel"),
         (lambda: replaced(steps_per_snapshot=1), "steps_per_snapshot is 2 there and 1 here"),

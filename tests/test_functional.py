@@ -19,6 +19,7 @@ from jaxsph.effects import (
     ShiftingTransport,
 )
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 SCOPES = {  # each effect's own scope and those of its sums
     Continuity: {"Continuity", "velocity_divergence"},
@@ -51,7 +52,7 @@ SUBSETS = [
 
 @pytest.fixture(scope="module")
 def scene():
-    return taylor_green(12, arrangement=JitteredLattice())
+    return taylor_green(12, arrangement=JitteredLattice(), scheme=DeltaPlus())
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +158,7 @@ def test_new_coefficients_do_not_recompile(scene, neighbors):
         moved = getattr(rates(changed, scene.state, neighbors), field)
         assert float(jnp.max(jnp.abs(moved - getattr(first, field)))) > 0.0, "it does count"
     # a scene made anew with other parameters runs in the same program, too
-    other = taylor_green(12, 50.0, arrangement=JitteredLattice())
+    other = taylor_green(12, 50.0, arrangement=JitteredLattice(), scheme=DeltaPlus())
     rates(other.functional(), other.state, neighbors)
     assert len(traces) == 1
     rates(with_effects(scene, BARE), scene.state, neighbors)
@@ -182,14 +183,14 @@ def test_coefficients_differentiate(scene, neighbors):
 
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
 def test_dtype_follows_the_state(dtype):
-    scene = taylor_green(12, arrangement=JitteredLattice(), dtype=dtype)
+    scene = taylor_green(12, arrangement=JitteredLattice(), scheme=DeltaPlus(), dtype=dtype)
     neighbors = scene.search().build(scene.state.position)
     rates = eqx.filter_jit(scene.functional())(jnp.asarray(0.0, dtype), scene.state, neighbors)
     for leaf in jax.tree.leaves((scene.state, rates)):
         assert leaf.dtype == dtype
     if dtype == jnp.float32:
         double = ParticleState(*(a.astype(jnp.float64) for a in jax.tree.leaves(scene.state)))
-        reference = taylor_green(12, arrangement=JitteredLattice())
+        reference = taylor_green(12, arrangement=JitteredLattice(), scheme=DeltaPlus())
         exact = eqx.filter_jit(reference.functional())(jnp.asarray(0.0), double, neighbors)
         for found, value in zip(jax.tree.leaves(rates), jax.tree.leaves(exact), strict=True):
             size = float(jnp.max(jnp.abs(value)))
