@@ -44,10 +44,12 @@ from .trajectory import Snapshot as Snapshot
 from .trajectory import Trajectory as Trajectory
 from .vector import Vector as Vector
 from .version import __version__ as __version__
+from .wall_forces import WallForces as WallForces
 from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
 from .walls import MovingBody as MovingBody
 from .walls import MovingWall as MovingWall
 from .walls import Region as Region
 from .walls import SignedDistance as SignedDistance
+from .walls import WallPart as WallPart
 from .walls import Walls as Walls

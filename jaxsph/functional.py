@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from .effects import BodyForce, Context, Effect
 from .fluid import Fluid
 from .neighbors import VerletList, WallList
-from .pairs import Space, pair_sum
+from .pairs import PairTerm, Space, pair_sum
 from .particles import ParticleState, in_dtype
 from .wall_sums import ghost_sums, wall_sums
 from .walls import Walls
@@ -103,6 +103,14 @@ class SPHFunctional(eqx.Module):
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
         """Context, fields and sums of the second pass, in the list's sorted order."""
+        context, fields, _, _, sums = self.passes(time, state, neighbors)
+        return context, fields, sums
+
+    def passes(
+        self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
+    ) -> tuple[Context, dict[str, Array], dict[str, Array], tuple[PairTerm, ...], dict[str, Array]]:
+        """Context, fields of the particles and of the ghosts, and the second pass's terms and sums,
+        in the list's sorted order."""
         state = jax.tree.map(neighbors.sort, state)
         walls = None if self.walls is None else self.walls.at(time)
         context = self.context(time, walls, neighbors if walls is None else neighbors.fluid)
@@ -134,7 +142,7 @@ class SPHFunctional(eqx.Module):
         with jax.named_scope("rate_pass"):
             terms = tuple(t for e in self.effects for t in e.rate_terms(context))
             sums = _summed(terms, context, fields, ghosts, neighbors)
-        return context, fields, sums
+        return context, fields, ghosts, terms, sums
 
     def _ghosts(self, walls: Walls, neighbors: WallList) -> dict[str, Array]:
         """What ghosts have of the walls, and the volume of a particle at rest."""

@@ -61,7 +61,12 @@ def kept_run(
         coordinates = jax.eval_shape(made.observe, state).coordinates
         modes = None if coordinates is None else coordinates.shape[0]
         writer = TrajectoryWriter.create(
-            path, scene, modes=modes, made_by=wanted, overwrite=done is not None
+            path,
+            scene,
+            modes=modes,
+            made_by=wanted,
+            overwrite=done is not None,
+            forces=options.get("measure"),
         )
     with writer, progress(done or 0) as report:
         part = simulate(

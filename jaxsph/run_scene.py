@@ -10,6 +10,7 @@ from .kept_run import kept_run
 from .progress import shown_steps
 from .simulate import simulate
 from .trajectory import Trajectory
+from .wall_forces import WallForces
 
 
 def run_scene(
@@ -27,7 +28,8 @@ def run_scene(
             cut short, or read where it is whole. The scene may be any, edited ones too.
         progress: True for a bar on stderr, as of the command line; or what is called with the
             number of steps done since its last call.
-        options: of `simulate`: `stepping`, and, without a path, `recorder`.
+        options: of `simulate`: `stepping`; `measure`, the forces on the scene's walls unless
+            another is given, None for nothing; and, without a path, `recorder`.
 
     Raises:
         TrajectoryFileError: if the file holds another run, naming what differs; it stays as it is.
@@ -43,6 +45,7 @@ def run_scene(
         >>> bool(energy[-1] < energy[0])  # viscosity takes it
         True
     """
+    options.setdefault("measure", WallForces.of(scene))
     shown = partial(shown_steps, progress, scene.steps)
     if path is not None:
         return kept_run(

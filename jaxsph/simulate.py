@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time as clock
 import warnings
 from collections.abc import Callable
@@ -27,6 +28,7 @@ from .schedule import Schedule
 from .timing import Timing
 from .trajectory import Snapshot, Trajectory
 
+_LOADS = ("forces", "torques")
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
 
 
@@ -34,6 +36,9 @@ class Recorder(Protocol):
     """Takes snapshots as the run makes them (an open trajectory file, say)."""
 
     def append(self, step: int, time: float, snapshot: Snapshot) -> None: ...
+
+
+Measure = Callable[[Any, jax.Array, Any], tuple[dict[str, jax.Array], dict[str, jax.Array]]]
 
 
 @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
@@ -52,6 +57,7 @@ def simulate(
     progress: Callable[[int], None] | None = None,
     metadata: dict | None = None,
     stepping: Stepping = FixedSteps(),  # noqa: B008
+    measure: Measure | None = None,
 ) -> Trajectory:
     """Integrate a model and return its snapshots, the first being the state given.
 
@@ -70,6 +76,8 @@ def simulate(
         metadata: kept with the trajectory, beside `steps`, `run_seconds`, `compile_seconds`.
         stepping: equal steps of dt; or `AutomaticSteps`, with intervals of the same length. By
             RK4, or another `Stepper` given to either.
+        measure: model, time [s] and state of each snapshot -> forces and torques to go with it, by
+            name: `jaxsph.WallForces.of(scene)`, say.
 
     Raises:
         ValueError: if no whole interval is left to run.
@@ -95,6 +103,9 @@ def simulate(
     records, times = [], []
 
     def record(step, snapshot):
+        if measure is not None:
+            loads = measure(model, jnp.asarray(step * time_step, dtype), state)
+            snapshot = dataclasses.replace(snapshot, **dict(zip(_LOADS, loads, strict=True)))
         snapshot = jax.tree.map(np.asarray, snapshot)
         particle = _lost(snapshot)
         if particle is not None:
@@ -122,7 +133,13 @@ def simulate(
             density=stacked.density,
             pressure=stacked.pressure,
             coordinates=stacked.coordinates,
+<<<<<<< HEAD
             metadata={**(metadata or {}), **took.metadata()},
+=======
+            forces=stacked.forces,
+            torques=stacked.torques,
+            metadata={**(metadata or {}), **timings},
+>>>>>>> bodies
         )
 
     compile_seconds, run_seconds, step = 0.0, 0.0, first_step

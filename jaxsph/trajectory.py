@@ -21,7 +21,8 @@ from .timing import Timing
 class Snapshot(eqx.Module):
     """Particle fields at one time: position [m], velocity [m/s], density [kg/m^3], pressure [Pa].
 
-    `coordinates` are the reduced coordinates where a reduced model made the snapshot.
+    `coordinates` are the reduced coordinates where a reduced model made the snapshot; `forces` (n,)
+    [N] and `torques` [N m] those of the fluid on its walls and their named parts, where measured.
     """
 
     position: Float[Array, "*times particles dim"]
@@ -29,6 +30,8 @@ class Snapshot(eqx.Module):
     density: Float[Array, "*times particles"]
     pressure: Float[Array, "*times particles"]
     coordinates: Float[Array, "*times modes"] | None = None
+    forces: dict[str, Array] = eqx.field(default_factory=dict)
+    torques: dict[str, Array] = eqx.field(default_factory=dict)
 
 
 class Trajectory(eqx.Module):
@@ -39,6 +42,9 @@ class Trajectory(eqx.Module):
         position, velocity: (S, N, n) [m], [m/s].
         density, pressure: (S, N) [kg/m^3], [Pa].
         coordinates: (S, M) of a reduced model, else None.
+        forces: (S, n) [N] of the fluid on its walls (`"walls"`) and on each named part of them, by
+            name, of a metre's depth in two dimensions; empty where none were measured.
+        torques: the same [N m], about the origin, (S,) in two dimensions and (S, 3) in three.
         metadata: scene, parameters, and what the run took; JSON-like.
     """
 
@@ -48,6 +54,8 @@ class Trajectory(eqx.Module):
     density: Float[np.ndarray, "times particles"]
     pressure: Float[np.ndarray, "times particles"]
     coordinates: Float[np.ndarray, "times modes"] | None = None
+    forces: dict[str, Float[np.ndarray, "times dim"]] = eqx.field(default_factory=dict)
+    torques: dict[str, Float[np.ndarray, "times ..."]] = eqx.field(default_factory=dict)
     metadata: dict[str, Any] = eqx.field(static=True, default_factory=dict)
 
     @property
@@ -76,7 +84,8 @@ class Trajectory(eqx.Module):
         """A snapshot by its number; -1 for the last."""
         coordinates = None if self.coordinates is None else self.coordinates[number]
         fields = (self.position, self.velocity, self.density, self.pressure)
-        return Snapshot(*(field[number] for field in fields), coordinates)
+        loads = ({k: v[number] for k, v in each.items()} for each in (self.forces, self.torques))
+        return Snapshot(*(field[number] for field in fields), coordinates, *loads)
 
     # What follows imports inside, since plotting and io import this module.
 
@@ -153,6 +162,7 @@ class Trajectory(eqx.Module):
             "speed": spread(speed, "m/s"),
             "density": spread(self.density, "kg/m^3"),
             "pressure": spread(self.pressure, "Pa"),
+            **({"forces on": ", ".join(self.forces)} if self.forces else {}),
             **({} if self.coordinates is None else {"modes": str(self.coordinates.shape[-1])}),
         }
 

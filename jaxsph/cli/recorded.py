@@ -18,6 +18,7 @@ from ..progress import progress_bar
 from ..scenes import Scene
 from ..simulate import simulate
 from ..trajectory import Trajectory
+from ..wall_forces import WallForces
 from .errors import fail
 from .options import STEPPING, print_rows
 
@@ -51,6 +52,7 @@ def simulate_and_report(
                 progress=bar.update,
                 metadata=metadata,
                 stepping=STEPPING[options.steps],
+                measure=WallForces.of(scene),
             )
             writer.finish(trajectory.metadata)
     except SimulationError as error:

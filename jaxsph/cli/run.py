@@ -7,6 +7,7 @@ from pathlib import Path
 import jax
 
 from ..io import TrajectoryWriter, check_target
+from ..wall_forces import WallForces
 from .options import STEPPING, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
@@ -66,5 +67,6 @@ def _run(options) -> int:
         made(make, {**settings, **unpacked(make)})  # meets all bad input before the packing
         scene = made(make, settings)
         model = scene.model(margin=options.capacity_margin)
-        writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite)
+        forces = WallForces.of(scene)
+        writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite, forces=forces)
         return simulate_and_report(options, scene, model, writer, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -105,10 +106,26 @@ def _rows(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
         low, high = measures["lowest_density"], measures["highest_density"]
         rows["density"] = f"{low:.5g} to {high:.5g} kg/m^3 ({some})"
         rows["largest speed"] = f"{measures['highest_speed']:.4g} m/s ({some})"
+    unit = "N" if overview.dim == 3 else "N/m"
+    for name, told in overview.forces.items():
+        if told["last_force"] is not None:
+            force = ", ".join(f"{value:.5g}" for value in told["last_force"])
+            rows[f"force on {name}"] = f"({force}) {unit} at last{_coefficients(told)}"
     if "run_seconds" in overview.metadata:
         rows["run"] = f"{overview.metadata['run_seconds']:.3g} s"
     rows["versions"] = ", ".join(f"{name} {text}" for name, text in overview.versions.items())
     return rows
+
+
+def _coefficients(told: dict[str, Any]) -> str:
+    """Mean drag and lift, with what they refer to; nothing where these are not known."""
+    if not math.isfinite(told.get("drag_coefficient", math.nan)):
+        return ""
+    return (
+        f"; drag coefficient {told['drag_coefficient']:.5g}, lift coefficient "
+        f"{told['lift_coefficient']:.5g} (last fifth; {told['reference_speed']:g} m/s, "
+        f"{told['reference_length']:g} m)"
+    )
 
 
 def _size(count: int) -> str:

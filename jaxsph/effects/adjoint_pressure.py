@@ -1,13 +1,16 @@
 """Pressure force and continuity whose discrete energy is conserved to round-off."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array
 
 from ..at_ghosts import Otherwise, Same
 from ..kernel_moments import lattice_moments
 from ..pairs import PairTerm, pair_sum
 from ..symmetric import product, times
-from .base import Effect, given
+from .base import Context, Effect, given
 from .continuity import Continuity
 from .pressure_force import PressureForce
 from .wall_pressure import GHOST_WEIGHT, WallPressure, per_weight
@@ -214,22 +217,69 @@ class AdjointPressure(Effect):
             velocity = velocity - fields["balanced_force"]
         return {"velocity": velocity, "density": -density * divergence}
 
+    def on_walls(self, context, fields, surface):
+        """What the pressure that is taken out, the mean and that at rest, does to the walls."""
+        rest, pressure = _Rest.of(context, fields), fields["pressure"]
+        if not rest.forces:
+            mean = jnp.broadcast_to(_mean(pressure, fields), surface.points.shape[:1])
+            return surface.pressed(mean, jnp.zeros_like(fields["velocity"][0]))
+        density, there = rest.density(fields["position"]), rest.density(surface.points)
+        mean = _mean(pressure - context.fluid.pressure(density), fields)
+        weight = context.mass * jnp.sum(rest.force_per_mass(density, fields), axis=0)
+        return surface.pressed(context.fluid.pressure(there) + mean, weight)
+
 
 def _acting_pressure(context, fields):
     """p less its mean and the pressure at rest (N,) [Pa]; that one's force, if there is any."""
-    pressure, volume, balance = fields["pressure"], fields["volume"], {}
-    parts = (force.conservative_part(context.space.box) for force in context.forces)
-    forces = [part for part in parts if part is not None]
-    if forces:
-        position, fluid = fields["position"], context.fluid
-        potential = sum(force.potential(context.time, position) for force in forces)
-        total = fluid.enthalpy(fields["density"]) + potential
-        level = jnp.sum(volume * total) / jnp.sum(volume)
-        rest = fluid.density_of_enthalpy(level - potential)
-        pressure = pressure - fluid.pressure(rest)
-        acceleration = sum(force.acceleration(context.time, position) for force in forces)
-        balance["balanced_force"] = (rest / fields["density"])[:, None] * acceleration
-    return pressure - jnp.sum(volume * pressure) / jnp.sum(volume), balance
+    rest = _Rest.of(context, fields)
+    acting = fields["pressure"]
+    balance = {}
+    if rest.forces:
+        density = rest.density(fields["position"])
+        acting = acting - context.fluid.pressure(density)
+        balance["balanced_force"] = rest.force_per_mass(density, fields)
+    return acting - _mean(acting, fields), balance
+
+
+def _mean(values, fields):
+    volume = fields["volume"]
+    return jnp.sum(volume * values) / jnp.sum(volume)
+
+
+class _Rest(NamedTuple):
+    """The fluid at rest in the forces that have a potential.
+
+    Args:
+        context: time and fluid are read.
+        forces: their conservative parts.
+        level: C, the mean enthalpy plus Phi [m^2/s^2].
+    """
+
+    context: Context
+    forces: tuple
+    level: Array | None
+
+    @classmethod
+    def of(cls, context, fields):
+        parts = (force.conservative_part(context.space.box) for force in context.forces)
+        rest = cls(context, tuple(part for part in parts if part is not None), None)
+        if not rest.forces:
+            return rest
+        total = context.fluid.enthalpy(fields["density"]) + rest.potential(fields["position"])
+        return rest._replace(level=_mean(total, fields))
+
+    def potential(self, position):
+        return sum(force.potential(self.context.time, position) for force in self.forces)
+
+    def density(self, position):
+        """rho_rest (P,) at positions."""
+        return self.context.fluid.density_of_enthalpy(self.level - self.potential(position))
+
+    def force_per_mass(self, density, fields):
+        """b rho_rest / rho_i (N, n), `density` being rho_rest at the particles."""
+        time, position = self.context.time, fields["position"]
+        acceleration = sum(force.acceleration(time, position) for force in self.forces)
+        return (density / fields["density"])[:, None] * acceleration
 
 
 def _sharpening(space) -> float:

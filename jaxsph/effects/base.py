@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..fluid import Fluid
 from ..neighbors import VerletList
 from ..pairs import PairTerm, Space
+from ..wall_surface import Loads, WallSurface
 from ..walls.moving_body import Bodies
 
 
@@ -110,6 +111,10 @@ class Effect(eqx.Module):
     def rates(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
         """Contributions to the rates of `position`, `velocity` and `density`."""
         return {}
+
+    def on_walls(self, context: Context, fields: dict, surface: WallSurface) -> Loads | None:
+        """What of the force on each part of the walls is in no sum over ghosts, if anything is."""
+        return None
 
     def ghost_terms(self, context: Context) -> tuple[PairTerm, ...]:
         """Sums wanted for each ghost i over the fluid particles j near it.

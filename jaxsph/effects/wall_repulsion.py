@@ -59,6 +59,9 @@ class WallRepulsion(Effect):
         strength = _STRENGTH * context.fluid.sound_speed**2 / spacing
         return {"velocity": -(strength * closeness**2)[:, None] * outward}
 
+    def on_walls(self, context, fields, surface):
+        return surface.held_off(context.mass * self.rates(context, fields, {})["velocity"])
+
     def _distance(self, bodies):
         """Positions -> distances to the nearest wall."""
         fixed = self.fluid_region.signed_distance

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import h5py
 
-from .trajectory_file import UNITS, TrajectoryFileError
+from .trajectory_file import LOADS, UNITS, TrajectoryFileError
 
 # gzip takes a third longer to write than lzf (6 against 4.5 ms a snapshot of 4096 particles) and
 # saves a sixth instead of a tenth; any HDF5 reads it.
@@ -74,7 +74,7 @@ def abandon(file: h5py.File) -> None:
         file.close()
 
 
-def add_dataset(file, name, shape, dtype, **options) -> None:
+def add_dataset(file, name, shape, dtype, **options) -> h5py.Dataset:
     """An empty dataset of snapshots, `shape` each, with the unit of its name."""
     dataset = file.create_dataset(
         name,
@@ -84,7 +84,8 @@ def add_dataset(file, name, shape, dtype, **options) -> None:
         chunks=(1, *shape) if shape else (256,),
         **options,
     )
-    dataset.attrs["unit"] = UNITS[name]
+    dataset.attrs["unit"] = (UNITS | LOADS)[name.partition("/")[0]]
+    return dataset
 
 
 def unwritable(path: Path, error: Exception) -> TrajectoryFileError:

@@ -10,7 +10,15 @@ from typing import Any
 
 from ..schedule import Schedule
 from ..trajectory import Snapshot
-from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, schedule_of
+from .recorded_forces import told
+from .trajectory_file import (
+    FIELDS,
+    TrajectoryFileError,
+    opened,
+    patient,
+    read_loads,
+    schedule_of,
+)
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,8 @@ class Overview:
         particles, dim: how many, and in how many dimensions.
         dtype: of the fields.
         size: of the file [bytes].
+        forces: on each part of the walls, by name: the last one [N], and where the run has ended
+            drag and lift coefficients, means over its last fifth, with what they refer to.
     """
 
     scene: str
@@ -47,6 +57,7 @@ class Overview:
     dim: int
     dtype: str
     size: int
+    forces: dict[str, dict[str, Any]]
 
 
 @patient
@@ -75,6 +86,7 @@ def read_overview(path: str | os.PathLike) -> Overview:
             dim=file["position"].shape[2],
             dtype=str(file["position"].dtype),
             size=path.stat().st_size,
+            forces=told(file, count),
         )
 
 
@@ -95,4 +107,5 @@ def read_snapshot(path: str | os.PathLike, number: int = -1) -> tuple[float, Sna
         number %= count
         coordinates = file["coordinates"][number] if "coordinates" in file else None
         fields = (file[name][number] for name in FIELDS)
-        return float(file["time"][number]), Snapshot(*fields, coordinates=coordinates)
+        loads = read_loads(file, number)
+        return float(file["time"][number]), Snapshot(*fields, coordinates=coordinates, **loads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from types import SimpleNamespace
@@ -43,10 +44,20 @@ def save_trajectory(
         state=trajectory.state(0),
         schedule=Schedule(time_step, each, int(steps[-1]) // each),
     )
+    names = tuple(trajectory.forces)
+    unknown = (math.nan,) * len(names)  # what coefficients refer to
+    forces = SimpleNamespace(
+        names=names, reference_speeds=unknown, reference_lengths=unknown, density=math.nan
+    )
     coordinates = trajectory.coordinates
     modes = None if coordinates is None else coordinates.shape[1]
     with TrajectoryWriter.create(
-        path, record, modes=modes, made_by={}, overwrite=overwrite
+        path,
+        record,
+        modes=modes,
+        made_by={},
+        overwrite=overwrite,
+        forces=forces if names else None,
     ) as writer:
         for number, step in enumerate(steps):
             writer.append(int(step), float(time[number]), trajectory.snapshot(number))

@@ -32,6 +32,7 @@ UNITS = {
     "time": "s",
     "step": "1",
 }
+LOADS = {"forces": "N", "torques": "N m"}  # groups of a dataset for each part of the walls
 FIELDS = ("position", "velocity", "density", "pressure")
 _ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -115,7 +116,8 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
             metadata["steps"] = int(file["step"][count - 1])
         fields = {name: file[name][:count] for name in ("time", *FIELDS)}
         coordinates = file["coordinates"][:count] if "coordinates" in file else None
-        return Trajectory(**fields, coordinates=coordinates, metadata=metadata)
+        loads = read_loads(file, slice(count))
+        return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **loads)
 
 
 def read_walls(path: str | os.PathLike) -> np.ndarray | None:
@@ -157,6 +159,23 @@ def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpo
             state=state,
             content=json.loads(_text(file.attrs["content"])) if "content" in file.attrs else None,
         )
+
+
+def growing(file: h5py.File) -> list[str]:
+    """The datasets that have a row for each snapshot."""
+    fields = [name for name in UNITS if name in file]
+    loads = [f"{kind}/{name}" for kind in LOADS if kind in file for name in file[kind]]
+    return fields + [name for name in loads if name != "forces/time"]  # the time itself, linked
+
+
+def read_loads(file: h5py.File, rows: int | slice) -> dict[str, dict[str, np.ndarray]]:
+    """Forces and torques of some snapshots, by the names of the walls' parts."""
+    found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in LOADS}
+    for path in growing(file):
+        kind, _, name = path.partition("/")
+        if name:
+            found[kind][name] = file[path][rows]
+    return found
 
 
 def schedule_of(file: h5py.File) -> Schedule:
@@ -203,7 +222,7 @@ def opened(path: Path) -> Iterator[tuple[h5py.File, int]]:
     with file:
         try:
             _check_schema(path, file)
-            lengths = {len(file[name]) for name in UNITS if name in file}
+            lengths = {len(file[name]) for name in growing(file)}
             if file.attrs["complete"] and len(lengths) > 1:
                 raise damaged
             steps = file["step"][: min(lengths)]

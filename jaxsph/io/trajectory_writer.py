@@ -20,14 +20,18 @@ from ..content import content
 from ..environment import versions
 from ..record import plain
 from ..trajectory import Snapshot
+from ..wall_forces import WallForces
 from .growing_file import COMPRESSION, abandon, add_dataset, begin, check_target, unwritable
 from .lock import Lock
+from .recorded_forces import begin_forces, link_time, sum_up
 from .trajectory_file import (
     FORMAT,
+    LOADS,
     SCHEMA_VERSION,
     UNITS,
     TrajectoryFileError,
     count_up_to,
+    growing,
     opened,
 )
 
@@ -74,6 +78,7 @@ class TrajectoryWriter:
         metadata: dict | None = None,
         made_by: Mapping[str, str] | None = None,
         overwrite: bool = False,
+        forces: WallForces | None = None,
     ) -> TrajectoryWriter:
         """A new file for a run of a scene; folders are made as needed.
 
@@ -85,6 +90,7 @@ class TrajectoryWriter:
             metadata: kept with the trajectory, JSON-like.
             made_by: the `content` of what makes the run; that of the scene if none is given.
             overwrite: whether an existing file may be replaced.
+            forces: on the walls, if snapshots carry those that this measures.
 
         Raises:
             TrajectoryFileError: if the file exists, cannot be made, or is being written.
@@ -125,6 +131,8 @@ class TrajectoryWriter:
             walls = getattr(scene, "walls", None)
             if walls is not None:
                 file.create_group("walls")["position"] = np.float32(walls.fixed_position)
+            if forces is not None:
+                begin_forces(file, forces, shapes["position"][1], np.dtype(state.position.dtype))
 
         return cls(path, fill)
 
@@ -150,8 +158,9 @@ class TrajectoryWriter:
                 _copy_attributes(source, file, scene)
                 for name in source:
                     source.copy(name, file)
-                    if name in UNITS:
-                        file[name].resize(count, 0)
+                for name in growing(source):
+                    file[name].resize(count, 0)
+                link_time(file)
 
         return cls(path, fill)
 
@@ -182,18 +191,22 @@ class TrajectoryWriter:
                 _copy_attributes(old, file, scene)
                 metadata = {name: json.loads(old.attrs["metadata"]).get(name) for name in _ORIGIN}
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
+                rows = growing(old)
                 for name in old:
-                    if name not in UNITS:
+                    if name not in (*UNITS, *LOADS):
                         old.copy(name, file)
-                        continue
+                for name in rows:
                     like = old[name]
-                    add_dataset(
+                    made = add_dataset(
                         file, name, like.shape[1:], like.dtype, fillvalue=like.fillvalue,
                         **(COMPRESSION if like.compression else {}),
                     )  # fmt: skip
-                    file[name].resize(count, 0)
+                    for key, value in like.attrs.items():
+                        made.attrs[key] = value
+                    made.resize(count, 0)
                     for k in range(count):
-                        file[name][k] = like[k]
+                        made[k] = like[k]
+                link_time(file)
 
             return cls(path, fill)
 
@@ -206,6 +219,9 @@ class TrajectoryWriter:
         if step == self.last_step:
             return
         fields = {name: getattr(snapshot, name) for name in UNITS if hasattr(snapshot, name)}
+        for kind in LOADS:
+            loads = getattr(snapshot, kind).items()
+            fields |= {f"{kind}/{name}": value for name, value in loads}
         self._tried(lambda: self._store({**fields, "time": time, "step": step}))
         self._count, self.last_step, self.last_time = self._count + 1, step, time
 
@@ -234,6 +250,7 @@ class TrajectoryWriter:
                     f"{room}; keep large results elsewhere."
                 )
             self._tried(lambda: attributes.modify("metadata", text))
+        self._tried(lambda: sum_up(self._file, self._count))
         self._tried(lambda: attributes.modify("complete", True))
         self._tried(self._file.flush)
 

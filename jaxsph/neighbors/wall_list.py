@@ -54,6 +54,13 @@ class WallPairs(eqx.Module):
     def ghost_rows(self) -> tuple[int, int]:
         return self.near.shape[0], self.index.shape[0]
 
+    def only(self, held: Bool[Array, " all_ghosts"]) -> WallPairs:
+        """The pairs with those ghosts alone, by their numbers."""
+        particles = jnp.ones(self.near.shape, bool)
+        row = jnp.concatenate([particles, held[self.ghosts]])
+        own = jnp.arange(row.shape[0], dtype=self.index.dtype)[:, None]
+        return replace(self, index=jnp.where(row[self.index] & row[:, None], self.index, own))
+
 
 class WallList(eqx.Module):
     """The Verlet list of the fluid, and the pairs that it makes with ghosts.

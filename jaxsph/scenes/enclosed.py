@@ -11,7 +11,7 @@ from ..effects import BodyForce, Effect
 from ..kernels import Kernel
 from ..record import record
 from ..schemes import Consistent, Scheme
-from ..walls import MovingWall, Region, Walls
+from ..walls import MovingWall, Region, WallPart, Walls
 from .composed import composed, positive
 from .scales import Scale
 from .scene import Scene
@@ -32,6 +32,7 @@ def enclosed_flow(
     scheme: Scheme | None = None,
     side: float | None = None,
     moving: Sequence[MovingWall] = (),
+    parts: Sequence[WallPart] = (),
     force: BodyForce | None = None,
     wall_velocity: Effect | None = None,
     pressure: Callable | None = None,
@@ -57,6 +58,7 @@ def enclosed_flow(
         scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
+        parts: of the walls, whose forces are recorded by name.
         force: body force, if there is one.
         wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
@@ -84,7 +86,7 @@ def enclosed_flow(
         mach=mach,
         side=side,
         region=fluid_region,
-        walls=lambda space: Walls.around(fluid_region, space, moving, layers),
+        walls=lambda space: Walls.around(fluid_region, space, moving, layers, parts=parts),
         pressure=pressure,
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,

@@ -2,6 +2,7 @@
 
 from .moving_body import Bodies as Bodies
 from .moving_body import MovingBody as MovingBody
+from .parts import WallPart as WallPart
 from .region import BallRegion as BallRegion
 from .region import BoxRegion as BoxRegion
 from .region import Region as Region

@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..pairs import Space
 from .moving_body import Bodies, MovingBody
+from .parts import WallPart
 from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
@@ -47,6 +48,7 @@ class Walls(eqx.Module):
         velocity: of the wall at each ghost (G, n) [m/s].
         fluid_region: where fluid may be, but for moving bodies (static).
         bodies: that move across themselves, if there are any, where they are now.
+        parts: whose forces are told apart (static).
     """
 
     position: Float[Array, "ghosts dim"]
@@ -54,6 +56,8 @@ class Walls(eqx.Module):
     velocity: Float[Array, "ghosts dim"]
     fluid_region: Region = eqx.field(static=True)
     bodies: Bodies | None = None
+    # what is told of a run does not make it another run: `content` leaves it out
+    parts: tuple[WallPart, ...] = eqx.field(static=True, default=(), compare=False)
 
     @classmethod
     def around(
@@ -63,6 +67,7 @@ class Walls(eqx.Module):
         moving: Sequence[MovingWall] = (),
         layers: int | None = None,
         bodies: Sequence[MovingBody] = (),
+        parts: Sequence[WallPart] = (),
     ) -> Walls:
         """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
 
@@ -74,10 +79,12 @@ class Walls(eqx.Module):
                 three leave a particle beside the wall a support that is not full.
             bodies: that are moved through that region. Where one meets a fixed wall it must reach
                 the kernel's support deep into the region, and should stay that far in.
+            parts: of the walls, moving bodies among them, whose forces are recorded by name.
 
         Raises:
             ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
-                that does not move along it, or a body without room in the region or too thin.
+                that does not move along it, a body without room in the region or too thin, or a
+                named part without a ghost.
 
         Examples:
             >>> import jax.numpy as jnp
@@ -126,14 +133,16 @@ class Walls(eqx.Module):
                 )
         here = [jnp.asarray(a) for a in (ghosts, normal, velocity)]
         if not bodies:
-            return cls(*here, fluid_region)
+            _check_parts(parts, ghosts)
+            return cls(*here, fluid_region, None, tuple(parts))
         position, normal, owner = _body_ghosts(fluid_region, bodies, space, thickness)
         owner = jnp.concatenate([jnp.full(len(ghosts), len(bodies)), jnp.asarray(owner)])
         moved = Bodies.at_start(bodies, owner.astype(jnp.int32), space.box)
         more = (position, normal, np.zeros_like(position))
         here = [jnp.concatenate([a, jnp.asarray(b)]) for a, b in zip(here, more, strict=True)]
         here[2] = here[2] + moved.of_ghosts(moved.velocity)
-        return cls(*here, fluid_region, moved)
+        _check_parts(parts, np.asarray(here[0]))
+        return cls(*here, fluid_region, moved, tuple(parts))
 
     @property
     def start_region(self) -> Region:
@@ -159,6 +168,7 @@ class Walls(eqx.Module):
             self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity),
             self.fluid_region,
             then,
+            self.parts,
         )
 
     def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
@@ -182,6 +192,19 @@ class Walls(eqx.Module):
         for _ in range(position.shape[1] + 1):  # out of the corner, then off each of its walls
             position = _put_off(self.fluid_region, position, margin)
         return position
+
+
+def _check_parts(parts: Sequence[WallPart], ghosts: np.ndarray) -> None:
+    """A ValueError for two parts of one name, or one without a ghost."""
+    names = [part.name for part in parts]
+    for part in parts:
+        if names.count(part.name) > 1:
+            raise ValueError(f"parts: two have the name {part.name!r}; give each its own.")
+        if not (distances(part.region, ghosts) < 0.0).any():
+            raise ValueError(
+                f"part {part.name}: no ghost lies in {part.region}; let it cover some of the wall, "
+                "several spacings thick, beyond the fluid."
+            )
 
 
 def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:

@@ -49,7 +49,7 @@ def test_another_scene_in_the_same_folder_is_refused(tmp_path):
     kept = full_run(tmp_path, make(), silent)
     (path,) = tmp_path.rglob("*.h5")
     before = path.read_bytes()
-    for other, named in ((swirled, "state.velocity"), (heavy, r"effects\[6\]")):
+    for other, named in ((swirled, "state.velocity"), (heavy, r"effects\[7\]")):
         with pytest.raises(TrajectoryFileError, match=named):
             full_run(tmp_path, other(), silent)
     assert path.read_bytes() == before

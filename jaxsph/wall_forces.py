@@ -1,0 +1,141 @@
+"""The force of the fluid on its walls and on named parts of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+from scipy.spatial import cKDTree
+
+from .at_ghosts import Otherwise
+from .compiler_options import COMPILER_OPTIONS
+from .effects.local_no_slip import NearWeight
+from .full_model import FullModel
+from .pairs import PairTerm
+from .particles import ParticleState
+from .wall_sums import wall_sums
+from .wall_surface import Loads, WallSurface, reaction
+from .walls.parts import WHOLE
+from .walls.surface import surface
+from .walls.walls import distances
+
+
+class WallForces(eqx.Module):
+    """Force and torque on the walls, from the very sums that act on the fluid:
+
+        F_B = -m sum_i (d(du_i/dt) / dS) . S_B,
+
+    S_B what the ghosts of a part B add to the sums S of the second pass, in which the rates of
+    velocity are affine; the fields made of the first pass stay as they are. So action equals
+    reaction to round-off for every effect that has ghosts. Forces on the walls beside these sums,
+    of a pressure that is taken out of them or of a repulsion, are added by their own effects
+    (docs, "forces on walls").
+
+    Args:
+        names: of the parts, all the walls together first (static).
+        reference_lengths: L of each part [m] (static).
+        reference_speeds: U of each part [m/s] (static).
+        density: rho0 [kg/m^3] (static).
+        held: which ghosts belong to each part.
+        points, areas, parts: as those of `WallSurface`.
+
+    Examples:
+        >>> import jax.numpy as jnp
+        >>> import jaxsph
+        >>> tank = jaxsph.scenes.hydrostatic_tank(16)
+        >>> forces, torques = jaxsph.WallForces.of(tank)(tank.model(), jnp.zeros(()), tank.state)
+        >>> round(float(forces["walls"][1]), -1)  # N/m: 1000 kg of water, g = 1 m/s^2
+        -1000.0
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    reference_lengths: tuple[float, ...] = eqx.field(static=True)
+    reference_speeds: tuple[float, ...] = eqx.field(static=True)
+    density: float = eqx.field(static=True)
+    held: Bool[Array, "parts ghosts"]
+    points: Float[Array, "points dim"]
+    areas: Float[Array, "points dim"]
+    parts: Bool[Array, "parts points"]
+
+    @classmethod
+    def of(cls, scene: Any) -> WallForces | None:
+        """Those of a scene; None if it has no walls."""
+        walls, space = scene.walls, scene.space
+        if walls is None:
+            return None
+        ghosts = np.asarray(walls.position)
+        own = [distances(part.region, ghosts) < 0.0 for part in walls.parts]
+        held = [np.ones(len(ghosts), bool), *own]
+        points, areas, behind = surface(walls.fluid_region, space)
+        _, nearest = cKDTree(ghosts).query(behind)
+        lengths = [float(np.ptp(ghosts[own], axis=0).max() + space.spacing) for own in held]
+        lengths[1:] = [
+            part.reference_length or length
+            for part, length in zip(walls.parts, lengths[1:], strict=True)
+        ]
+        speed, dtype = float(scene.fluid.reference_speed), walls.position.dtype
+        return cls(
+            (WHOLE, *(part.name for part in walls.parts)),
+            tuple(lengths),
+            (speed, *(part.reference_speed or speed for part in walls.parts)),
+            float(scene.fluid.reference_density),
+            jnp.asarray(np.stack(held)),
+            jnp.asarray(points, dtype),
+            jnp.asarray(areas, dtype),
+            jnp.asarray(np.stack([own[nearest] for own in held])),
+        )
+
+    def __call__(
+        self, model: FullModel, time: Float[Array, ""], state: ParticleState
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Forces (n,) [N] of the fluid on each part, and torques about the origin [N m], scalars in
+        two dimensions, by name; of a metre's depth in two dimensions.
+
+        Args:
+            model: of the scene.
+            time: [s].
+            state: the particles then.
+        """
+        loads = _measured(self, model, time, state)
+        return tuple(dict(zip(self.names, value, strict=True)) for value in loads)
+
+
+def loads(
+    forces: WallForces, model: FullModel, time: Float[Array, ""], state: ParticleState
+) -> Loads:
+    """Forces (K, n) and torques on all parts; pure, so differentiate and map it."""
+    neighbors = model.at(time).prepare(state)
+    functional = model.functional
+    context, fields, ghosts, terms, sums = functional.passes(time, state, neighbors)
+    near = PairTerm("wall_nearness", (), None, Otherwise((), _nearness(context.space)))
+
+    def rates(sums):
+        parts = (effect.rates(context, fields, sums) for effect in functional.effects)
+        return sum(part["velocity"] for part in parts if "velocity" in part)
+
+    def of_part(held):
+        pairs = neighbors.wall.only(held)
+        added = wall_sums((*terms, near), fields, ghosts, context.space, pairs)
+        share = added.pop("wall_nearness")
+        added = {k: added.get(k, jnp.zeros_like(s)) for k, s in sums.items()}
+        return context.mass * jax.jvp(rates, (sums,), (added,))[1], share
+
+    given, nearness = jax.vmap(of_part)(forces.held)
+    whole = nearness[:1]
+    shares = nearness / jnp.where(whole > 0.0, whole, 1.0)
+    position = fields["position"]
+    seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares)
+    found = [reaction(position, given)]
+    found += [effect.on_walls(context, fields, seen) for effect in functional.effects]
+    return jax.tree.map(lambda *a: sum(a[1:], a[0]), *(each for each in found if each is not None))
+
+
+_measured = eqx.filter_jit(loads, compiler_options=COMPILER_OPTIONS)
+
+
+def _nearness(space) -> NearWeight:
+    return NearWeight(1.0 / space.kernel_at_spacing)
