@@ -133,13 +133,9 @@ def simulate(
             density=stacked.density,
             pressure=stacked.pressure,
             coordinates=stacked.coordinates,
-<<<<<<< HEAD
-            metadata={**(metadata or {}), **took.metadata()},
-=======
             forces=stacked.forces,
             torques=stacked.torques,
-            metadata={**(metadata or {}), **timings},
->>>>>>> bodies
+            metadata={**(metadata or {}), **took.metadata()},
         )
 
     compile_seconds, run_seconds, step = 0.0, 0.0, first_step

@@ -79,7 +79,8 @@ def test_every_run_leaves_a_page(tmp_path, capsys):
     assert "out/taylor-green/report.html" in printed
     page = checked_page(tmp_path / "out" / "taylor-green" / "report.html")
     assert len(page.figures) == 2
-    for word in ("taylor-green", "reynolds", "AdjointPressure", "jaxlib", "cores", "Kinetic energy"):
+    words = ("taylor-green", "reynolds", "AdjointPressure", "jaxlib", "cores", "Kinetic energy")
+    for word in words:
         assert word in page.text
     for name in ("run", "compile", "velocity error", "kinetic energy error"):
         value = page.cells[page.cells.index(name) + 1]
