@@ -233,7 +233,7 @@ def _on_particles(meter: _Meter, scene: Scene, model, state) -> dict[str, Any]:
         "particles": particles,
         "neighbors": measure.interacting_pairs(scene.state.position, scene.space) / particles,
         "list_capacity": model.search.capacity,
-        "cell_capacity": model.search.cell_capacity,
+        "run_capacity": model.search.run_capacity,
         "cells": model.search.grid.cells,
     }
 

@@ -47,9 +47,9 @@ class SPHFunctional(eqx.Module):
 
         Examples:
             >>> import jaxsph
-            >>> from jaxsph.effects import LaminarViscosity
+            >>> from jaxsph.effects import ConsistentViscosity
             >>> functional = jaxsph.scenes.taylor_green(16).functional()
-            >>> float(functional.with_effect(LaminarViscosity(0.5)).effects[2].viscosity)
+            >>> float(functional.with_effect(ConsistentViscosity(0.5)).effects[2].viscosity)
             0.5
         """
         kinds = [type(e) for e in self.effects]

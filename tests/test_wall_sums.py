@@ -30,6 +30,7 @@ from jaxsph.effects import Context, LaminarViscosity
 from jaxsph.kernels import WendlandC2
 from jaxsph.neighbors import WallPairs
 from jaxsph.scenes import lid_driven_cavity
+from jaxsph.schemes import DeltaPlus
 from jaxsph.wall_sums import ghost_sums, wall_sums
 
 GRAVITY = effects.Gravity(jnp.asarray([0.0, -1.0]))
@@ -376,7 +377,7 @@ def test_a_mirrored_vector_is_the_particles_own_reversed_at_the_wall(wall):
 
 def test_reverse_mode_of_a_walled_scene_equals_central_differences():
     """A scalar of all rates, differentiated in state, viscosity and lid velocity."""
-    scene = lid_driven_cavity(12, arrangement=JitteredLattice(0.3))
+    scene = lid_driven_cavity(12, arrangement=JitteredLattice(0.3), scheme=DeltaPlus())
     rng = np.random.default_rng(0)
     position = scene.state.position
     state = ParticleState(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -9,6 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
 from ..domain import Box
@@ -69,21 +71,7 @@ class CellGrid:
 
         The number `cells` stands for "outside the box".
         """
-        index = np.indices(self.shape).reshape(len(self.shape), -1)
-        offsets = []
-        for n, periodic in zip(self.shape, self.box.periodic, strict=True):
-            around = np.arange(-self.reach, self.reach + 1)
-            # in a narrow periodic box the stencil would meet itself: each cell counts once
-            offsets.append(np.arange(n) if periodic and len(around) > n else around)
-        around = np.stack(np.meshgrid(*offsets, indexing="ij"), -1).reshape(-1, len(self.shape))
-        outside = np.zeros((self.cells, len(around)), bool)
-        flat = np.zeros((self.cells, len(around)), np.int64)
-        for k, (n, periodic) in enumerate(zip(self.shape, self.box.periodic, strict=True)):
-            place = index[k][:, None] + around[None, :, k]
-            if not periodic:
-                outside |= (place < 0) | (place >= n)
-            flat = flat * n + place % n
-        return np.where(outside, self.cells, flat).astype(np.int32)
+        return stencil(self.shape, self.box.periodic, self.reach)
 
     @cached_property
     def centers(self) -> np.ndarray:
@@ -105,14 +93,27 @@ class CellGrid:
         """The largest number of points in one cell (outside jit, to choose a capacity)."""
         return int(np.bincount(np.asarray(self.locate(position)), minlength=self.cells).max())
 
-    def bin(self, position: Float[Array, "points dim"], capacity: int) -> CellBins:
-        """Sort points into cells that hold at most `capacity` each; says so when one overflows."""
-        cell = self.locate(position)
-        order = jnp.argsort(cell).astype(jnp.int32)
-        cell = cell[order]
+    def sort(self, cell: Int[Array, " points"]):
+        """Points in the order of their cells: their numbers, their cells, and where each begins.
+
+        Of equal cells the smaller number comes first. A point may be in the cell past the last.
+        """
+        count = cell.shape[0]
+        numbers = jnp.arange(count, dtype=jnp.int32)
+        if (self.cells + 1) * count < 2**31:  # one sort of whole numbers, four times as fast
+            key = lax.sort(cell * count + numbers)
+            cell = key // count
+            order = key - cell * count
+        else:
+            cell, order = lax.sort((cell, numbers), num_keys=1)
         edges = jnp.searchsorted(
             cell, jnp.arange(self.cells + 2, dtype=cell.dtype), method="scan"
         ).astype(jnp.int32)
+        return order, cell, edges
+
+    def bin(self, position: Float[Array, "points dim"], capacity: int) -> CellBins:
+        """Sort points into cells that hold at most `capacity` each; says so when one overflows."""
+        order, cell, edges = self.sort(self.locate(position))
         start, end = edges[:-1], edges[1:]
         places = start[:, None] + jnp.arange(capacity, dtype=jnp.int32)[None, :]
         return CellBins(
@@ -122,3 +123,26 @@ class CellGrid:
             slot=jnp.arange(position.shape[0], dtype=jnp.int32) - start[cell],
             overflow=jnp.max(end - start) > capacity,
         )
+
+
+def stencil(shape: tuple[int, ...], periodic: tuple[bool, ...], reach: int) -> np.ndarray:
+    """(cells, neighbours): the cells around each cell of a grid, itself included, each once.
+
+    Their number stands for "outside the box".
+    """
+    cells = math.prod(shape)
+    index = np.indices(shape).reshape(len(shape), -1)
+    offsets = []
+    for n, wraps in zip(shape, periodic, strict=True):
+        around = np.arange(-reach, reach + 1)
+        # in a narrow periodic box the stencil would meet itself: each cell counts once
+        offsets.append(np.arange(n) if wraps and len(around) > n else around)
+    around = np.stack(np.meshgrid(*offsets, indexing="ij"), -1).reshape(-1, len(shape))
+    outside = np.zeros((cells, len(around)), bool)
+    flat = np.zeros((cells, len(around)), np.int64)
+    for k, (n, wraps) in enumerate(zip(shape, periodic, strict=True)):
+        place = index[k][:, None] + around[None, :, k]
+        if not wraps:
+            outside |= (place < 0) | (place >= n)
+        flat = flat * n + place % n
+    return np.where(outside, cells, flat).astype(np.int32)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Bool, Float, Int, UInt32
+from jaxtyping import Array, Float, Int
 
-from ..chunks import chunked_map
 from ..domain import Box
-from .cell_grid import CellBins, CellGrid
+from .cell_grid import CellGrid
+from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 
 CAPACITY_MARGIN = 1.15  # room in the list over its need at the start; every slot costs time
-_WORD = 32  # candidates are flagged in the bits of 32-bit words
-_BLOCK = 16_000_000  # particle-candidate pairs examined at a time
+RUN_MARGIN = 1.25  # the same for runs of cells
 
 
 class VerletList(eqx.Module):
@@ -52,7 +50,7 @@ class VerletList(eqx.Module):
 
     @property
     def overflow(self) -> Array:
-        """Whether a row or a cell had more entries than fit; the list is then not usable."""
+        """Whether a row or a run of cells had more than fits; the list is then not usable."""
         return (self.largest_count > self.index.shape[1]) | (self.cell_overflow > 0)
 
 
@@ -64,14 +62,14 @@ class NeighborSearch(eqx.Module):
         support: radius of the kernel's support [m].
         skin: extra radius [m]; the list stays valid until a particle has moved half of it.
         capacity: neighbours a particle can have.
-        cell_capacity: particles a cell can hold.
+        run_capacity: particles that a run of cells can hold, as many as the search reaches over.
     """
 
     grid: CellGrid = eqx.field(static=True)
     support: float = eqx.field(static=True)
     skin: float = eqx.field(static=True)
     capacity: int = eqx.field(static=True)
-    cell_capacity: int = eqx.field(static=True)
+    run_capacity: int = eqx.field(static=True)
 
     @classmethod
     def allocate(
@@ -93,12 +91,12 @@ class NeighborSearch(eqx.Module):
         radius = support + skin
         check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
-        cell_capacity = int(1.3 * grid.occupancy(position)) + 2
-        trial = cls(grid, support, skin, 1, cell_capacity)
+        run_capacity = int(RUN_MARGIN * int(_longest_run(grid, position))) + 2
+        trial = cls(grid, support, skin, 1, run_capacity)
         largest = int(_most_neighbors(trial, position))
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
-        return cls(grid, support, skin, capacity, cell_capacity)
+        return cls(grid, support, skin, capacity, run_capacity)
 
     @property
     def box(self) -> Box:
@@ -109,7 +107,7 @@ class NeighborSearch(eqx.Module):
         return replace(
             self,
             capacity=math.ceil(1.2 * self.capacity),
-            cell_capacity=math.ceil(1.2 * self.cell_capacity),
+            run_capacity=math.ceil(1.2 * self.run_capacity),
         )
 
     def largest_motion(self, neighbors: VerletList, position: Array) -> tuple[Array, Array]:
@@ -119,42 +117,23 @@ class NeighborSearch(eqx.Module):
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
         """The list of all neighbours within support + skin of each particle, inside jit."""
         position = lax.stop_gradient(position)
-        bins, words, largest = self._flag(position)
+        points, words, largest = self._flag(position)
+        longest = longest_run(self.grid, points, points)
+        places = jnp.arange(points.count, dtype=jnp.int32)
         return VerletList(
-            index=pick(words, bins.cell, self._candidates(bins), self.capacity),
-            order=bins.order,
-            inverse=bins.inverse.astype(jnp.int32),
+            index=pick(words, self.grid, points, points, self.run_capacity, self.capacity),
+            order=points.order,
+            inverse=jnp.zeros_like(places).at[points.order].set(places, unique_indices=True),
             reference=position,
             largest_count=largest,
-            cell_overflow=bins.overflow.astype(jnp.int32),
+            cell_overflow=(longest > self.run_capacity).astype(jnp.int32),
         )
 
-    def _candidates(self, bins: CellBins) -> Int[Array, "cells candidates"]:
-        """Sorted places of all particles in each cell's neighbourhood, N where there is none."""
-        return candidates(bins, self.grid, bins.order.shape[0])
-
     def _flag(self, position):
-        """Bins, and for each particle a bit per candidate of its cell: neighbour or not."""
-        bins = self.grid.bin(position, self.cell_capacity)
-        nowhere = jnp.full((1, position.shape[1]), jnp.nan, position.dtype)
-        padded = jnp.concatenate([position[bins.order], nowhere])
-        candidates = self._candidates(bins)
-        radius_squared = (self.support + self.skin) ** 2
-
-        def flag(block):
-            members, around = block
-            here, there = padded[members], padded[around]
-            squared = jnp.zeros((), position.dtype)
-            for k in range(position.shape[1]):
-                separation = there[:, None, :, k] - here[:, :, None, k]
-                squared = squared + self.grid.box.minimum_image(separation, k) ** 2
-            near = (squared < radius_squared) & (around[:, None, :] != members[:, :, None])
-            return pack(near)
-
-        chunk = max(1, _BLOCK // (self.cell_capacity * candidates.shape[1]))
-        words = chunked_map(flag, (bins.members[:-1], candidates), chunk)
-        words = words[bins.cell, bins.slot]
-        return bins, words, jnp.max(count_bits(words))
+        """Sorted points, a bit for each candidate of each: neighbour or not; and their most."""
+        points = Sorted.of(self.grid, position)
+        words = flags(self.grid, points, points, self.support + self.skin, self.run_capacity)
+        return points, words, jnp.max(count_bits(words))
 
 
 def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
@@ -169,68 +148,12 @@ def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
             )
 
 
-def candidates(bins: CellBins, grid: CellGrid, nothing: int) -> Int[Array, "cells candidates"]:
-    """Members of all cells around each cell, filled up with `nothing` to whole words of bits."""
-    around = bins.members[grid.stencil].reshape(grid.cells, -1)
-    padding = -around.shape[1] % _WORD
-    return jnp.pad(around, ((0, 0), (0, padding)), constant_values=nothing)
-
-
-def pack(flags: Bool[Array, "*rows candidates"]) -> UInt32[Array, "*rows words"]:
-    """Flags as the bits of 32-bit words."""
-    bits = flags.reshape(flags.shape[:-1] + (-1, _WORD)).astype(jnp.uint32)
-    shift = jnp.arange(_WORD, dtype=jnp.uint32).reshape((1,) * flags.ndim + (_WORD,))
-    return jnp.sum(bits << shift, axis=-1, dtype=jnp.uint32)
-
-
-def count_bits(words: UInt32[Array, "rows words"]) -> Int[Array, " rows"]:
-    """Number of set bits of each row."""
-    return jnp.sum(lax.population_count(words), axis=1, dtype=jnp.uint32).astype(jnp.int32)
-
-
-def pick(
-    words: UInt32[Array, "rows words"],
-    cell: Int[Array, " rows"],
-    candidates: Int[Array, "cells candidates"],
-    capacity: int,
-    own: int = 0,
-    entry: int = 0,
-) -> Int[Array, "rows capacity"]:
-    """Each row's bits as a list: slot k holds the candidate of the k-th set bit.
-
-    A free slot holds the row's own number. Row numbers count from `own`, entries from `entry`.
-    """
-    count = words.shape[1]
-    flat = candidates.reshape(-1)
-    slots = jnp.arange(capacity, dtype=jnp.int32)[None, :]
-    along = partial(jnp.take_along_axis, axis=1, mode="promise_in_bounds")
-
-    def rows(block):
-        words, cell, row = block
-        counts = lax.population_count(words).astype(jnp.int32)
-        through = jnp.cumsum(counts, axis=1, dtype=jnp.int32)
-        before = through[:, :, None] <= slots[:, None, :]
-        word = jnp.sum(before, axis=1, dtype=jnp.int32)
-        found = word < count
-        word = jnp.minimum(word, count - 1)
-        rank = slots - along(through - counts, word)
-        bits = along(words, word)
-        bit = jnp.zeros_like(rank)
-        for half in (16, 8, 4, 2, 1):  # binary search for the rank-th set bit
-            low = bits & jnp.uint32((1 << half) - 1)
-            below = lax.population_count(low).astype(jnp.int32)
-            upper = rank >= below
-            rank = jnp.where(upper, rank - below, rank)
-            bits = jnp.where(upper, bits >> jnp.uint32(half), bits)
-            bit = jnp.where(upper, bit + half, bit)
-        place = (cell[:, None] * count + word) * _WORD + bit
-        place = flat.at[place].get(mode="promise_in_bounds")
-        return jnp.where(found, place + entry, row[:, None])
-
-    row = own + jnp.arange(words.shape[0], dtype=jnp.int32)
-    return chunked_map(rows, (words, cell, row), max(1, _BLOCK // (capacity * count)))
-
-
 @eqx.filter_jit  # compiled once for scenes alike
 def _most_neighbors(search: NeighborSearch, position):
     return search._flag(position)[2]
+
+
+@eqx.filter_jit
+def _longest_run(grid: CellGrid, position):
+    points = Sorted.of(grid, position)
+    return longest_run(grid, points, points)

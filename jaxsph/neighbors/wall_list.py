@@ -13,21 +13,12 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 from scipy.spatial import cKDTree
 
-from ..chunks import chunked_map
 from ..domain import Box
 from .cell_grid import CellGrid
-from .verlet_list import (
-    CAPACITY_MARGIN,
-    NeighborSearch,
-    VerletList,
-    candidates,
-    count_bits,
-    pack,
-    pick,
-)
+from .cell_runs import Sorted, count_bits, flags, longest_run, pick
+from .verlet_list import CAPACITY_MARGIN, RUN_MARGIN, NeighborSearch, VerletList
 
 _FILLED = 0.7  # share of the places near walls that a vessel full of fluid takes, at least
-_BLOCK = 4_000_000  # candidates looked at in one go
 
 
 class WallPairs(eqx.Module):
@@ -91,7 +82,7 @@ class WallList(eqx.Module):
 
     @property
     def overflow(self) -> Array:
-        """Whether a row, a cell or the number of particles near walls exceeds its room."""
+        """Whether a row, a run of cells or the number of particles near walls exceeds its room."""
         return self.fluid.overflow | self.crowded
 
 
@@ -110,7 +101,7 @@ class WalledSearch(eqx.Module):
         wall_grid: cells over the fluid's box and its ghosts.
         near_capacity: particles that can be near a wall.
         capacity: partners a particle or a ghost can have across the wall.
-        near_cell_capacity, ghost_cell_capacity: of each kind in a cell.
+        near_run_capacity, ghost_run_capacity: of each kind in a run of cells.
     """
 
     fluid: NeighborSearch
@@ -120,8 +111,8 @@ class WalledSearch(eqx.Module):
     wall_grid: CellGrid = eqx.field(static=True)
     near_capacity: int = eqx.field(static=True)
     capacity: int = eqx.field(static=True)
-    near_cell_capacity: int = eqx.field(static=True)
-    ghost_cell_capacity: int = eqx.field(static=True)
+    near_run_capacity: int = eqx.field(static=True)
+    ghost_run_capacity: int = eqx.field(static=True)
 
     @classmethod
     def allocate(
@@ -149,17 +140,24 @@ class WalledSearch(eqx.Module):
         half_diagonal = 0.5 * math.hypot(*reach_grid.widths)
         within_reach = jnp.asarray(distance < radius + half_diagonal)
         wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
-        most_ghosts = wall_grid.occupancy(ghosts)
-        trial = cls(
+        whole = cls(
             fluid,
             ghosts,
             None if moving else within_reach,
             reach_grid,
             wall_grid,
+            position.shape[0],
             1,
             1,
-            int(1.3 * wall_grid.occupancy(position)) + 2,
-            int(1.3 * most_ghosts) + 2 if moving else most_ghosts,
+            1,
+        )
+        near_run, ghost_run = map(int, _longest_runs(whole, position))
+        more = RUN_MARGIN if moving else 1.0
+        trial = replace(
+            whole,
+            near_capacity=1,
+            near_run_capacity=int(RUN_MARGIN * near_run) + 2,
+            ghost_run_capacity=math.ceil(more * ghost_run) + (2 if moving else 0),
         )
         near = np.asarray(trial._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
         free = near & (distance > 0.72 * spacing)  # between ghosts is no room
@@ -187,8 +185,8 @@ class WalledSearch(eqx.Module):
             fluid=self.fluid.enlarged(),
             near_capacity=math.ceil(1.2 * self.near_capacity),
             capacity=math.ceil(1.2 * self.capacity),
-            near_cell_capacity=math.ceil(1.2 * self.near_cell_capacity),
-            ghost_cell_capacity=math.ceil(more * self.ghost_cell_capacity),
+            near_run_capacity=math.ceil(1.2 * self.near_run_capacity),
+            ghost_run_capacity=math.ceil(more * self.ghost_run_capacity),
         )
 
     def moved(self, ghosts: Float[Array, "ghosts dim"]) -> WalledSearch:
@@ -209,16 +207,15 @@ class WalledSearch(eqx.Module):
         """All pairs within support + skin, of two particles or of a particle and a ghost."""
         position = lax.stop_gradient(position)
         fluid = self.fluid.build(position)
-        near, ghosts, (seen, seeing), (overflow, _) = self._flag(fluid.sort(position))
-        count = near.shape[0]
-        index = jnp.concatenate(
-            [
-                pick(*seen, self.capacity, entry=count),
-                pick(*seeing, self.capacity, own=count),
-            ]
-        )
+        here, ghosts, (seen, seeing), (overflow, _) = self._flag(fluid.sort(position))
+        grid, near, count = self.wall_grid, here.order, here.count
+        to_ghosts, to_fluid = self.ghost_run_capacity, self.near_run_capacity
+        index = jnp.concatenate([
+            pick(seen, grid, here, ghosts, to_ghosts, self.capacity, entry=count),
+            pick(seeing, grid, ghosts, here, to_fluid, self.capacity, own=count),
+        ])  # fmt: skip
         built_at = self.ghosts if self.within_reach is None else None
-        return WallList(fluid, WallPairs(index, near, ghosts), overflow, built_at)
+        return WallList(fluid, WallPairs(index, near, ghosts.order), overflow, built_at)
 
     @partial(eqx.filter_jit, inline=True)
     def _may_see(self, position) -> Bool[Array, " points"]:
@@ -229,47 +226,29 @@ class WalledSearch(eqx.Module):
         held = jnp.zeros(grid.cells + 1, bool).at[grid.locate(self.ghosts)].set(True)
         return jnp.any(held[grid.stencil], axis=1)[grid.locate(position)]
 
-    def _flag(self, position):
-        """Near particles and ghosts, each in cell order; and the flags of each among the other."""
-        grid = self.wall_grid
+    def _sorted(self, position) -> tuple[Sorted, Sorted, Array]:
+        """Particles near walls and ghosts, each in the order of cells, and whether all fit."""
         within = self._may_see(position)
         # particles that are not near fill the rows left over: real ones, which see no ghost
         near = jnp.argsort(~within, stable=True)[: self.near_capacity].astype(jnp.int32)
-        particles = grid.bin(position[near], self.near_cell_capacity)
-        ghosts = grid.bin(self.ghosts, self.ghost_cell_capacity)
-        near = near[particles.order]
-        here, there = position[near], self.ghosts[ghosts.order]
-        sides, largest = [], jnp.zeros((), jnp.int32)
-        for points, cell, others, bins in (
-            (here, particles.cell, there, ghosts),
-            (there, ghosts.cell, here, particles),
+        here = Sorted.of(self.wall_grid, position[near], within[near])
+        here = replace(here, order=near[here.order])
+        return here, Sorted.of(self.wall_grid, self.ghosts), jnp.sum(within) > near.shape[0]
+
+    def _flag(self, position):
+        """Near particles and ghosts, and the flags of each among the other."""
+        grid, radius = self.wall_grid, self.fluid.support + self.skin
+        here, ghosts, overflow = self._sorted(position)
+        largest, sides = jnp.zeros((), jnp.int32), []
+        for points, others, room in (
+            (here, ghosts, self.ghost_run_capacity),
+            (ghosts, here, self.near_run_capacity),
         ):
-            around = candidates(bins, grid, others.shape[0])
-            words = self._within(points, cell, others, around)
+            words = flags(grid, points, others, radius, room)
             largest = jnp.maximum(largest, jnp.max(count_bits(words)))
-            sides.append((words, cell, around))
-        overflow = (
-            (jnp.sum(within) > near.shape[0])
-            | (particles.overflow | ghosts.overflow)
-            | (largest > self.capacity)
-        )
-        return near, ghosts.order, sides, (overflow, largest)
-
-    def _within(self, points, cell, others, around):
-        """Bits of the candidates `around` each point's cell that are within support + skin."""
-        padded = jnp.concatenate([others, jnp.full((1, self.box.dim), jnp.nan, others.dtype)])
-        radius_squared = (self.fluid.support + self.skin) ** 2
-
-        def rows(block):
-            points, cell = block
-            there = padded[around[cell]]
-            squared = jnp.zeros((), points.dtype)
-            for k in range(self.box.dim):
-                separation = there[:, :, k] - points[:, k : k + 1]
-                squared = squared + self.box.minimum_image(separation, k) ** 2
-            return pack(squared < radius_squared)
-
-        return chunked_map(rows, (points, cell), max(1, _BLOCK // around.shape[1]))
+            overflow = overflow | (longest_run(grid, points, others) > room)
+            sides.append(words)
+        return here, ghosts, sides, (overflow | (largest > self.capacity), largest)
 
 
 def _around(box: Box, margin: float) -> Box:
@@ -301,3 +280,11 @@ def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 @eqx.filter_jit  # compiled once for scenes alike
 def _most_ghosts(search: WalledSearch, position):
     return search._flag(position)[-1][1]
+
+
+@eqx.filter_jit
+def _longest_runs(search: WalledSearch, position):
+    """Of particles, as ghosts see them, and of ghosts, as particles do."""
+    here, ghosts, _ = search._sorted(position)
+    grid = search.wall_grid
+    return longest_run(grid, ghosts, here), longest_run(grid, here, ghosts)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxsph import Box, CellGrid, NeighborSearch, WalledSearch
+from tests.neighbors.longest_run import longest_run
 
 CLOSED, PERIODIC = False, True
 SPACING, SUPPORT, SKIN = 0.1, 0.2, 0.03
@@ -75,15 +76,15 @@ def roomy(box):
     within = (distances(box, reach_grid.centers, ghosts) < RADIUS + corner).any(1)
     grid = CellGrid.with_width(box, 0.5 * RADIUS, reach=2)
     return WalledSearch(
-        fluid=NeighborSearch(grid, SUPPORT, SKIN, capacity=COUNT - 1, cell_capacity=COUNT),
+        fluid=NeighborSearch(grid, SUPPORT, SKIN, capacity=COUNT - 1, run_capacity=COUNT),
         ghosts=jnp.asarray(ghosts),
         within_reach=jnp.asarray(within),
         reach_grid=reach_grid,
         wall_grid=wall_grid,
         near_capacity=COUNT,
         capacity=max(COUNT, 2 * int((distances(box, ghosts, ghosts) < RADIUS).sum(1).max())),
-        near_cell_capacity=COUNT,
-        ghost_cell_capacity=wall_grid.occupancy(jnp.asarray(ghosts)),
+        near_run_capacity=COUNT,
+        ghost_run_capacity=len(ghosts),
     )
 
 
@@ -208,8 +209,8 @@ def test_the_fluid_has_its_own_complete_list():
 LIMITS = {  # one capacity below what random particles need
     "particles near walls": {"near_capacity": 12},
     "partners": {"capacity": 4},
-    "ghosts in a cell": {"ghost_cell_capacity": 2},
-    "particles in a cell": {"near_cell_capacity": 2},
+    "ghosts in a run": {"ghost_run_capacity": 2},
+    "particles in a run": {"near_run_capacity": 2},
 }
 
 
@@ -226,8 +227,8 @@ def test_what_does_not_fit_is_flagged_and_nothing_is_lost_in_silence(limit, seed
     full = {
         "near_capacity": near.sum(),
         "capacity": max(partners.sum(0).max(), partners.sum(1).max()),
-        "near_cell_capacity": grid.occupancy(jnp.asarray(position)),  # all find a row
-        "ghost_cell_capacity": grid.occupancy(search.ghosts),
+        "near_run_capacity": longest_run(grid, search.ghosts, position[near]),
+        "ghost_run_capacity": longest_run(grid, position[near], search.ghosts),
     }
     ((name, room),) = limit.items()
     assert bool(neighbors.overflow) == (full[name] > room)
@@ -258,7 +259,7 @@ def test_allocation_fits_a_lattice_exactly_and_gives_rows_near_walls_only():
     assert side**2 - 16**2 < neighbors.wall.near.shape[0] <= side**2 - 14**2 + 1
     larger = search.enlarged()
     assert larger.fluid.capacity > search.fluid.capacity
-    for name in ("near_capacity", "capacity", "near_cell_capacity"):
+    for name in ("near_capacity", "capacity", "near_run_capacity"):
         assert getattr(larger, name) >= 1.2 * getattr(search, name)
 
 

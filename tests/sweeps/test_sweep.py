@@ -135,7 +135,7 @@ def test_a_list_that_overflows_is_enlarged(tmp_path, monkeypatch):
     def search(self, *rest):
         found = tight(self, *rest)
         return eqx.tree_at(lambda s: s, found, type(found)(
-            found.grid, found.support, found.skin, found.capacity - 8, found.cell_capacity
+            found.grid, found.support, found.skin, found.capacity - 8, found.run_capacity
         ))  # fmt: skip
 
     monkeypatch.setattr(type(scenes[0]), "search", search)
