@@ -28,7 +28,7 @@ class Fringe(Effect):
         start, end: of the fringe along the first axis [m] (static).
 
     Raises:
-        ValueError: if the end does not lie behind the start.
+        ValueError: if the end does not lie behind the start; on points that stay.
     """
 
     profile: eqx.Module
@@ -39,6 +39,12 @@ class Fringe(Effect):
     def __check_init__(self):
         if not self.start < self.end:
             raise ValueError(f"fringe: its end {self.end:g} m must lie behind {self.start:g} m.")
+
+    def on_fixed_points(self):
+        raise ValueError(
+            "effects: Fringe takes the place of all other accelerations, which models on points "
+            "that stay do not know; choose a scene that is periodic or closed."
+        )
 
     def step_limit(self, fluid, space):
         acting = self.rate > 0.0
