@@ -86,6 +86,8 @@ class SPHFunctional(eqx.Module):
             with jax.named_scope(effect.name):
                 for name, rate in effect.rates(context, fields, sums).items():
                     rates[name] = rates[name] + rate
+        for effect in self.effects:
+            rates = effect.governed(context, fields, rates)
         return jax.tree.map(neighbors.unsort, ParticleState(**rates))
 
     def context(

@@ -15,6 +15,8 @@ from .consistent_viscosity import ConsistentViscosity as ConsistentViscosity
 from .continuity import Continuity as Continuity
 from .density_diffusion import DensityDiffusion as DensityDiffusion
 from .free_surface import FreeSurface as FreeSurface
+from .fringe import Fringe as Fringe
+from .fringe import ParabolicProfile as ParabolicProfile
 from .gripped_pressure_force import GrippedPressureForce as GrippedPressureForce
 from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
 from .kernel_correction import KernelCorrection as KernelCorrection

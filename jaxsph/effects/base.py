@@ -112,6 +112,10 @@ class Effect(eqx.Module):
         """Contributions to the rates of `position`, `velocity` and `density`."""
         return {}
 
+    def governed(self, context: Context, fields: dict, rates: dict[str, Array]) -> dict[str, Array]:
+        """The rates that all effects together give, as this one leaves them."""
+        return rates
+
     def on_walls(self, context: Context, fields: dict, surface: WallSurface) -> Loads | None:
         """What of the force on each part of the walls is in no sum over ghosts, if anything is."""
         return None

@@ -3,6 +3,7 @@
 from . import plane_flow_solution as plane_flow_solution
 from . import taylor_green_solution as taylor_green_solution
 from .balanced import balanced as balanced
+from .channel_cylinder import channel_cylinder as channel_cylinder
 from .composed import composed as composed
 from .continued import continued as continued
 from .couette import couette as couette
@@ -13,9 +14,11 @@ from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity
 from .open_cavity import open_cavity as open_cavity
+from .open_channel import open_channel as open_channel
 from .oscillating_drop import oscillating_drop as oscillating_drop
 from .piston_wave_maker import piston_wave_maker as piston_wave_maker
 from .poiseuille import poiseuille as poiseuille
+from .poiseuille_open import poiseuille_open as poiseuille_open
 from .rotating_square_patch import rotating_square_patch as rotating_square_patch
 from .scales import Scale as Scale
 from .scene import Scene as Scene
@@ -32,6 +35,8 @@ SCENES = {
     "open-cavity": open_cavity,
     "couette": couette,
     "poiseuille": poiseuille,
+    "poiseuille-open": poiseuille_open,
+    "channel-cylinder": channel_cylinder,
     "hydrostatic-tank": hydrostatic_tank,
     "dam-break": dam_break,
     "elliptic-drop": elliptic_drop,

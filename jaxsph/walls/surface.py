@@ -9,9 +9,7 @@ from .region import Region
 from .walls import distances
 
 
-def surface(
-    fluid_region: Region, space: Space
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def surface(fluid_region: Region, space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points of the walls' surface [m], its area there [m^(n - 1)], a vector into the wall along
     one of the axes, and places in the wall behind them [m]; each (C, n).
 

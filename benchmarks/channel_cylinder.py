@@ -1,0 +1,91 @@
+"""Drag and lift of a cylinder in a channel, Schaefer and Turek's 2D-1, at several resolutions.
+
+    python -m benchmarks.channel_cylinder --resolutions 33 41 66
+
+Means and standard deviations of the coefficients over the second half of each run, whose force is
+taken every few steps. Every finished run's row is in the JSON file at once; the same command goes
+on where it was cut short.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxsph import run_scene
+from jaxsph.cli import positive_float, positive_int
+from jaxsph.environment import environment
+from jaxsph.scenes import channel_cylinder
+from jaxsph.scenes.channel_cylinder import DIAMETER, MEAN
+
+from .measure import format_rows, number, progress
+from .table import Table, command
+
+KEY = ("resolution", "h_over_dx", "mach", "end_time")
+LITERATURE = {"drag": (5.57, 5.59), "lift": (0.0104, 0.0110)}  # at Re = 20
+EACH = 5  # steps from force to force, or fewer
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 2: bad input."""
+    return command("channel_cylinder", __doc__, _arguments, _run, argv)
+
+
+def _arguments(add) -> None:
+    add("--resolutions", type=positive_int, nargs="+", default=[33, 41, 66], metavar="N",
+        help="particles across the channel, 4.1 times those across the cylinder")  # fmt: skip
+    add("--h-over-dx", type=positive_float, default=1.5, metavar="X", help="default: 1.5")
+    add("--mach", type=positive_float, default=0.1, metavar="M", help="default: 0.1")
+    add("--t-end", type=positive_float, default=5.0, metavar="T", help="default: 5 s")
+
+
+def _run(options) -> None:
+    kept = Table(options.json, KEY, beside=lambda rows: {"literature": LITERATURE})
+    shared = (options.h_over_dx, options.mach, options.t_end)
+    cases = (dict(zip(KEY, (n, *shared), strict=True)) for n in options.resolutions)
+    for case in kept.left(cases):
+        kept.add(case | run(case))
+    head = ("resolution", "across D", "drag", "+-", "lift", "+-", "seconds")
+    names = ("across_cylinder", "drag", "drag_deviation", "lift", "lift_deviation", "seconds")
+    rows = [(str(r["resolution"]), *(number(r[name], 4) for name in names)) for r in kept.rows]
+    print(format_rows(head, rows))
+
+
+def run(case: dict[str, Any]) -> dict[str, Any]:
+    """Coefficients, and what they took."""
+    scene = channel_cylinder(
+        case["resolution"],
+        h_over_dx=case["h_over_dx"],
+        mach=case["mach"],
+        end_time=case["end_time"],
+    )
+    each = max(k for k in range(1, EACH + 1) if scene.steps % k == 0)
+    scene = dataclasses.replace(scene, steps_per_snapshot=each)
+    with progress(f"{case['resolution']} across", scene.steps) as report:
+        trajectory = run_scene(scene, progress=report)
+    late = trajectory.time >= 0.5 * trajectory.time[-1]
+    coefficients = 2.0 * trajectory.forces["cylinder"][late] / (MEAN**2 * DIAMETER)
+    mean, deviation = coefficients.mean(axis=0), coefficients.std(axis=0)
+    return {
+        "across_cylinder": DIAMETER / scene.space.spacing,
+        "drag": float(mean[0]),
+        "drag_deviation": float(deviation[0]),
+        "lift": float(mean[1]),
+        "lift_deviation": float(deviation[1]),
+        "forces_taken": int(late.sum()),
+        "fastest": float(np.linalg.norm(trajectory.velocity[-1], axis=1).max()),
+        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
+        "seconds": trajectory.metadata["run_seconds"],
+        "steps": scene.steps,
+        "time_step": scene.time_step,
+        "particles": trajectory.particles,
+        "device": jax.devices()[0].device_kind,
+        "environment": environment(),
+    }
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

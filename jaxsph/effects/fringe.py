@@ -1,0 +1,76 @@
+"""A fringe, in which what flows out is made into what flows in."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..ramps import ramp
+from .base import Effect
+
+_RISE = 0.5  # of the fringe, over which its strength rises
+_STABLE = 2.0  # over the rate; RK4 stands 2.78
+
+
+class Fringe(Effect):
+    """du_i/dt = (1 - s_i) a_i - s_i rate (u_i - U(x_i)) between two places along the first axis:
+
+    a_i is the sum of all other effects, s rises smoothly from 0 to 1 over the first half of the
+    fringe and is 1 up to its end, U is the profile of the inflow. The box is periodic along that
+    axis, and the fringe its last part (after Spalart 1988; Nordstrom, Nordin and Henningson 1999,
+    who add the forcing to a_i and so fall short of U where a pressure has to be overcome). A
+    particle that leaves the channel at the fringe's start comes back behind its end with the
+    inflow's velocity; what the pressure does not balance in between the fringe holds.
+
+    Args:
+        profile: positions (N, n) [m] -> velocities of the inflow (N, n) [m/s]; an `eqx.Module`,
+            whose arrays may be swept and differentiated.
+        rate: [1/s], within the stability of the step.
+        start, end: of the fringe along the first axis [m] (static).
+
+    Raises:
+        ValueError: if the end does not lie behind the start; on points that stay.
+    """
+
+    profile: eqx.Module
+    rate: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    start: float = eqx.field(static=True)
+    end: float = eqx.field(static=True)
+
+    def __check_init__(self):
+        if not self.start < self.end:
+            raise ValueError(f"fringe: its end {self.end:g} m must lie behind {self.start:g} m.")
+
+    def on_fixed_points(self):
+        raise ValueError(
+            "effects: Fringe takes the place of all other accelerations, which models on points "
+            "that stay do not know; choose a scene that is periodic or closed."
+        )
+
+    def step_limit(self, fluid, space):
+        acting = self.rate > 0.0
+        return jnp.where(acting, _STABLE / jnp.where(acting, self.rate, 1.0), jnp.inf)
+
+    def governed(self, context, fields, rates):
+        position = fields["position"]
+        along = (position[:, 0] - self.start) / (self.end - self.start)
+        share = jnp.where(along <= 1.0, ramp(along, 0.0, _RISE), 0.0)[:, None]
+        pull = -self.rate * (fields["velocity"] - self.profile(position))
+        return rates | {"velocity": rates["velocity"] + share * (pull - rates["velocity"])}
+
+
+class ParabolicProfile(eqx.Module):
+    """u = 4 U y (H - y) / H^2 along the first axis, between walls at y = 0 and y = H.
+
+    Args:
+        peak: U [m/s].
+        height: H [m] (static).
+    """
+
+    peak: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    height: float = eqx.field(static=True)
+
+    def __call__(self, position: Float[Array, "points dim"]) -> Float[Array, "points dim"]:
+        """Velocities [m/s] at positions [m]."""
+        y = position[:, 1]
+        speed = (4.0 / self.height**2) * self.peak * y * (self.height - y)
+        return jnp.zeros_like(position).at[:, 0].set(speed)
