@@ -14,7 +14,7 @@ def test_the_python_examples_run(capsys):
     exec(compile(vessel, "README.md", "exec"), names)
     distance = ((names["walls"].position - 1.0) ** 2).sum(axis=1) ** 0.5
     assert float(distance.min()) >= 1.0 and float(distance.max()) < 1.2  # four layers of dx
-    assert "LaminarViscosity" in shown and "576, 2" in shown
+    assert "ConsistentViscosity" in shown and "576, 2" in shown
     assert float(shown.split()[-1]) < 0.0  # viscosity takes energy from the flow
 
 
