@@ -91,7 +91,7 @@ class NeighborSearch(eqx.Module):
         radius = support + skin
         check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
-        run_capacity = int(RUN_MARGIN * int(_longest_run(grid, position))) + 2
+        run_capacity = int(max(margin, RUN_MARGIN) * int(_longest_run(grid, position))) + 2
         trial = cls(grid, support, skin, 1, run_capacity)
         largest = int(_most_neighbors(trial, position))
         capacity = max(8, int(np.ceil(margin * largest)))

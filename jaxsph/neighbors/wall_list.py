@@ -152,11 +152,11 @@ class WalledSearch(eqx.Module):
             1,
         )
         near_run, ghost_run = map(int, _longest_runs(whole, position))
-        more = RUN_MARGIN if moving else 1.0
+        more = max(margin, RUN_MARGIN) if moving else 1.0
         trial = replace(
             whole,
             near_capacity=1,
-            near_run_capacity=int(RUN_MARGIN * near_run) + 2,
+            near_run_capacity=int(max(margin, RUN_MARGIN) * near_run) + 2,
             ghost_run_capacity=math.ceil(more * ghost_run) + (2 if moving else 0),
         )
         near = np.asarray(trial._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
