@@ -5,14 +5,32 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import final
 
 from tqdm import tqdm
 
+COMPILING = "compiling"
 
-def progress_bar(total: int, unit: str, done: int = 0) -> tqdm:
+
+@final
+class _Bar(tqdm):
+    """A bar that says that the program is being compiled, until the first steps are done."""
+
+    def update(self, n=1):
+        if self.postfix == COMPILING:
+            self.set_postfix_str("", refresh=False)
+        return super().update(n)
+
+
+def progress_bar(total: int, unit: str, done: int = 0, label: str | None = None) -> tqdm:
     """A bar on stderr with the estimated time left, seldom redrawn where that is a log file."""
     interval = 0.1 if sys.stderr.isatty() else 10.0
-    return tqdm(total=total, initial=done, unit=unit, file=sys.stderr, mininterval=interval)
+    bar = _Bar(
+        total=total, initial=done, unit=unit, desc=label, file=sys.stderr, mininterval=interval
+    )
+    if unit in ("step", "run"):
+        bar.set_postfix_str(COMPILING)
+    return bar
 
 
 @contextmanager

@@ -1,5 +1,7 @@
 """The command line: what it writes and prints, and how it says no."""
 
+import dataclasses
+import inspect
 import json
 import os
 import platform
@@ -21,6 +23,7 @@ from jaxsph.integrate import FaultCode, SimulationError
 from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import SCENES, taylor_green
+from jaxsph_command.scenes import scenes
 from tests.pages import checked_page
 
 TINY = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.1", "--arrangement", "lattice"]
@@ -38,7 +41,21 @@ def last_line(capsys):
 def test_lists_scenes(capsys):
     assert main(["scenes"]) == 0
     printed = capsys.readouterr().out
-    for word in (*SCENES, "PressureForce", "FreeSurface", "small"):
+    for word in SCENES:
+        assert f"\n{word}: " in f"\n{printed}"
+    # the sizes that are read from the sources are those of the scenes
+    for name, make in SCENES.items():
+        sizes = {found: scales for found, _, scales in scenes()}[name]
+        assert tuple(sizes) == SCALES
+        module = inspect.getmodule(make)
+        for kept in sizes["small"].items():
+            assert kept[0] in ("resolution", "h_over_dx", "time_step", "steps_per_snapshot")
+        for table in (vars(module).get(n) for n in ("SCALES", "SCALES_3D") if n in vars(module)):
+            if table["small"].resolution == sizes["small"]["resolution"]:
+                assert {k: dataclasses.asdict(v) for k, v in table.items()} == sizes
+    assert main(["scenes", "dam-break", "--scale", "small"]) == 0
+    printed = capsys.readouterr().out
+    for word in ("PressureForce", "FreeSurface", "1800 particles", "column"):
         assert word in printed
 
 

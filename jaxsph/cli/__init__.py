@@ -1,8 +1,9 @@
 """The command line: `jaxsph scenes`, `run`, `sweep`, `show`, `export` and `animate`."""
 
-from .errors import Parser as Parser
-from .errors import fail as fail
-from .errors import report_errors as report_errors
+from jaxsph_command.errors import Parser as Parser
+from jaxsph_command.errors import fail as fail
+from jaxsph_command.errors import report_errors as report_errors
+
 from .main import main as main
 from .options import ARRANGEMENTS as ARRANGEMENTS
 from .options import SCALES as SCALES

@@ -4,27 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..io import read_overview
+from jaxsph_command.errors import Parser
+
+from ..io import check_target, read_overview
 from ..progress import progress_bar
-from .options import positive_int, print_rows
+from .options import positive_int, print_rows, write_json
 
 FRAMES = 100  # at most, unless more are asked for
 FIELDS = ("velocity", "pressure", "density")
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    animate = commands.add_parser(
-        "animate",
-        help="draw a run as a moving picture",
-        description="Draw the particles of a trajectory file at all its times, coloured by a "
-        "field; of three-dimensional ones the middle layer.",
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Draw the particles of a trajectory file at all its times, coloured by a "
+        "field; of three-dimensional ones the middle layer."
     )
-    animate.set_defaults(command=_animate)
-    add = animate.add_argument
+    parser.set_defaults(command=_animate)
+    add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run; it may still be written")
-    add("--out", type=Path, metavar="FILE",
-        help=".gif or .mp4 to write (default: FILE, ending with .gif)")  # fmt: skip
+    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
+    add("--out", type=Path, metavar="DIR",
+        help="folder of it, or a file ending with .gif or .mp4 (default: FILE's)")  # fmt: skip
     add("--field", choices=FIELDS, default="velocity", help="default: %(default)s")
     add("--every", type=positive_int, metavar="N",
         help=f"show every N-th snapshot (default: for {FRAMES} frames or fewer)")  # fmt: skip
@@ -35,16 +36,21 @@ def add_to(commands) -> None:
 def _animate(options) -> int:
     from .. import plotting  # matplotlib takes its time to load
 
-    path = options.file.with_suffix(".gif") if options.out is None else options.out
+    if options.json is not None:
+        check_target(options.json)
+    path = options.out or options.file.parent
+    path = path if path.suffix else path / f"{options.file.stem}.gif"
     overview = read_overview(options.file)
     every = options.every or max(1, -(-overview.snapshots // FRAMES))
     count = -(-overview.snapshots // every)
     field = plotting.FIELDS[options.field]
     with progress_bar(count, "frame") as bar:
         plotting.animate(options.file, path, field, every, options.fps, bar.update)
-    print_rows({
+    rows = {
         "frames": f"{count} of {overview.snapshots} snapshots, {options.fps} per second",
         "field": field.label.replace("$", ""),
         "written": str(path),
-    })  # fmt: skip
+    }
+    print_rows(rows)
+    write_json(options.json, rows)
     return 0

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..io import read_overview, write_vtkhdf
+from jaxsph_command.errors import Parser
+
+from ..io import check_target, read_overview, write_vtkhdf
 from ..io.vtkhdf import EXPORTED
 from ..progress import progress_bar
-from .options import positive_int, print_rows
+from .options import positive_int, print_rows, result_file, write_json
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    export = commands.add_parser(
-        "export",
-        help="write a run for ParaView",
-        description="Write a trajectory file as VTKHDF, which ParaView (5.12 and later) opens with "
-        "all its times. Units are SI: m, s, m/s, kg/m^3, Pa. In two dimensions z is 0.",
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Write a trajectory file as VTKHDF, which ParaView (5.12 and later) opens with "
+        "all its times. Units are SI: m, s, m/s, kg/m^3, Pa. In two dimensions z is 0."
     )
-    export.set_defaults(command=_export)
-    add = export.add_argument
+    parser.set_defaults(command=_export)
+    add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run; it may still be written")
-    add("--out", type=Path, metavar="FILE", help="to write (default: FILE, ending with .vtkhdf)")
+    add("--out", type=Path, metavar="DIR",
+        help="folder of it, or a file ending with .vtkhdf (default: that of FILE)")  # fmt: skip
+    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
     add("--fields", nargs="+", choices=EXPORTED, default=EXPORTED, metavar="FIELD",
         help=f"of {', '.join(EXPORTED)} (default: all)")  # fmt: skip
     add("--every", type=positive_int, default=1, metavar="N",
@@ -29,14 +31,18 @@ def add_to(commands) -> None:
 
 
 def _export(options) -> int:
-    path = options.file.with_suffix(".vtkhdf") if options.out is None else options.out
+    path = result_file(options.out, options.file.parent, f"{options.file.stem}.vtkhdf")
+    if options.json is not None:
+        check_target(options.json)
     overview = read_overview(options.file)
     count = -(-overview.snapshots // options.every)
     with progress_bar(count, "snapshot") as bar:
         write_vtkhdf(options.file, path, options.fields, options.every, bar.update)
-    print_rows({
+    rows = {
         "snapshots": f"{count} of {overview.snapshots}",
         "fields": f"position, {', '.join(options.fields)}",
         "written": str(path),
-    })  # fmt: skip
+    }
+    print_rows(rows)
+    write_json(options.json, rows)
     return 0

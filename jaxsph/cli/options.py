@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from jaxsph_command.scenes import SCALES as SCALES
 
 from ..arrangements import JitteredLattice, Lattice, Packed, Stirred
 from ..integrate import AutomaticSteps, FixedSteps
@@ -17,7 +22,6 @@ ARRANGEMENTS = {
     "jittered": JitteredLattice,
     "stirred": Stirred,
 }
-SCALES = ("small", "half", "paper")
 MOST_NUMBERS = 100_000  # Reynolds numbers in a call
 
 
@@ -26,6 +30,14 @@ def positive_float(text: str) -> float:
     value = float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
+    return value
+
+
+def finite_float(text: str) -> float:
+    """A finite number."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be finite, got {text}")
     return value
 
 
@@ -81,6 +93,20 @@ def margin(text: str) -> float:
     if not 1.0 <= value < math.inf:
         raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
     return value
+
+
+def result_file(out: Path | None, folder: Path, name: str) -> Path:
+    """Where a file of results goes: to the folder that is asked for, or to the file where `out` has
+    the file's ending; else to the folder that is usual."""
+    out = folder if out is None else out
+    return out if out.suffix == Path(name).suffix or out.is_file() else out / name
+
+
+def write_json(path: Path | None, results: dict[str, Any]) -> None:
+    """Write results where they are asked for."""
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
 
 
 def print_rows(rows: dict[str, str]) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
+
+from jaxsph_command.errors import fail
 
 from ..environment import environment
 from ..history import energy_unit
@@ -19,8 +20,7 @@ from ..scenes import Scene
 from ..simulate import simulate
 from ..trajectory import Trajectory
 from ..wall_forces import WallForces
-from .errors import fail
-from .options import STEPPING, print_rows
+from .options import STEPPING, print_rows, write_json
 
 REPORT = "report.html"  # its name, beside the trajectory
 
@@ -63,9 +63,7 @@ def simulate_and_report(
     except KeyboardInterrupt:
         return fail("jaxsph", f"interrupted. {_holds(writer)} Go on with --resume.", 130)
     results = _results(scene, trajectory, writer.path)
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
+    write_json(options.json, {**results, **environment()})
     rows = _rows(results)
     print_rows({**rows, "report": str(_report(scene, writer, rows))})
     return 0
@@ -87,6 +85,8 @@ class _Progress:
 
     def append(self, step, time, snapshot):
         self.writer.append(step, time, snapshot)
+        if step == 0:
+            return  # nothing is compiled yet
         energy = float(kinetic_energy(snapshot.velocity, self.mass))
         self.bar.set_postfix_str(f"kinetic energy {energy:.4g} {self.unit}", refresh=False)
 

@@ -9,16 +9,18 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 
+from jaxsph_command.config import NAME, read_config, write_config
+from jaxsph_command.errors import Parser
+
 from ..arrangements import Lattice
 from ..content import content, differences
 from ..io import Checkpoint, TrajectoryWriter, check_target, read_checkpoint
 from ..particles import ParticleState
-from ..scenes import Scene
+from ..scenes import SCENES, Scene
 from ..scenes.record import scene_from_record
-from .errors import Parser
 from .options import positive_float, whole_number
 from .recorded import REPORT, simulate_and_report
-from .scene_functions import is_file, made
+from .scene_functions import made
 from .scene_options import scene_settings
 
 _COSTLY = ("Packed", "Stirred")  # to make, and as many particles as the lattice
@@ -81,7 +83,7 @@ def resume(options, make: Callable[..., Scene]) -> int:
     """
     path = options.resume
     checkpoint = read_checkpoint(path)
-    if not is_file(options.scene) and checkpoint.scene != options.scene:
+    if options.scene in SCENES and checkpoint.scene != options.scene:
         raise ValueError(
             f"{path}: holds a run of scene {checkpoint.scene}, not of {options.scene}; "
             f"name that scene or another file."
@@ -100,7 +102,7 @@ def resume(options, make: Callable[..., Scene]) -> int:
     check_target(target.with_name(REPORT))
     precision = options.precision or checkpoint.parameters.get("dtype")
     with jax.enable_x64(precision != "float32"):
-        if is_file(options.scene):
+        if options.scene not in SCENES:
             scene = _made_again(path, checkpoint, options, make)
         else:
             scene = _restored(path, checkpoint, options.t_end)
@@ -112,7 +114,15 @@ def resume(options, make: Callable[..., Scene]) -> int:
             writer = TrajectoryWriter.branch(path, target, checkpoint.step, longer)
         else:
             writer = TrajectoryWriter.append_to(path, longer)
+        _keep_config(options, path.with_name(NAME), target.with_name(NAME))
         return simulate_and_report(options, scene, model, writer, max(0, checkpoint.step))
+
+
+def _keep_config(options, old: Path, new: Path) -> None:
+    """What repeats the whole run: as it was first typed, with what is typed now."""
+    kept = read_config(old) if old.is_file() else {}
+    kept.pop("command", None)
+    write_config(new, options, **(kept | options.typed))
 
 
 def _time(text: str) -> float:

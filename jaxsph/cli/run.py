@@ -6,19 +6,17 @@ from pathlib import Path
 
 import jax
 
+from jaxsph_command.config import NAME, write_config
+from jaxsph_command.errors import Parser
+
 from ..io import TrajectoryWriter, check_target
+from ..scenes import SCENES
 from ..wall_forces import WallForces
 from .options import STEPPING, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
-from .scene_functions import is_file, made, scene_function
-from .scene_options import (
-    add_member_options,
-    add_scene_options,
-    given,
-    scene_settings,
-)
-from .scenes import unpacked
+from .scene_functions import made, name_of, scene_function, unpacked
+from .scene_options import add_scene_options, given, scene_settings
 
 _STEPS_HELP = (
     "fixed: dt throughout; automatic: as long as sound, viscosity, tension and forces allow "
@@ -30,35 +28,31 @@ _MARGIN_HELP = (
 )
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    run = commands.add_parser(
-        "run",
-        help="run a full model",
-        description="Run a full model; its snapshots go to DIR/trajectory.h5 as they are made, and "
-        f"at the end what came of it to DIR/{REPORT}.",
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Run a full model; its snapshots go to DIR/trajectory.h5 as they are made, and "
+        f"at the end what came of it to DIR/{REPORT}. DIR/{NAME} runs it again."
     )
-    run.set_defaults(command=_run)
-    add = run.add_argument
-    add_scene_options(add)
-    add_member_options(add)
+    parser.set_defaults(command=_run)
+    add = parser.add_argument
+    add_scene_options(parser, words)
     add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder of the results (default: out/SCENE)")
     add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
     add("--overwrite", action="store_true", help="replace a trajectory.h5 that is there")
-    add_resume_options(run)
+    add_resume_options(parser)
 
 
 def _run(options) -> int:
-    make = scene_function(options.scene)
+    make = options.make or scene_function(options.scene)
     if options.json is not None:
         check_target(options.json)
-    check_resume_options(options, [] if is_file(options.scene) else given(options))
+    check_resume_options(options, given(options) if options.scene in SCENES else [])
     if options.resume is not None:
         return resume(options, make)
-    name = make.__name__ if is_file(options.scene) else options.scene
-    path = (Path("out", name) if options.out is None else options.out) / "trajectory.h5"
+    path = (options.out or Path("out", name_of(options.scene, make))) / "trajectory.h5"
     check_target(path, options.overwrite)
     check_target(path.with_name(REPORT))
     precision = options.precision or "float64"
@@ -69,4 +63,5 @@ def _run(options) -> int:
         model = scene.model(margin=options.capacity_margin)
         forces = WallForces.of(scene)
         writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite, forces=forces)
+        write_config(path.with_name(NAME), options)
         return simulate_and_report(options, scene, model, writer, 0)

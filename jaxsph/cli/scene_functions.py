@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import ast
-import difflib
 import importlib.util
 import inspect
 import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+from jaxsph_command.errors import meant
+from jaxsph_command.scenes import GROUP
+
+from ..arrangements import Lattice
 from ..scenes import SCENES, Scene
 from ..scenes.record import rules_restored
 
@@ -32,13 +36,10 @@ def scene_function(scene: str) -> Callable[..., Scene]:
     Raises:
         ValueError: if there is none, or the file cannot be run.
     """
-    if not is_file(scene):
-        if scene not in SCENES:
-            raise ValueError(
-                f"scene: {scene!r} is not known{meant(scene, SCENES)}; choose one of "
-                f"{', '.join(SCENES)}, or give a file of your own, as my_scene.py:function."
-            )
+    if scene in SCENES:
         return SCENES[scene]
+    if not is_file(scene):
+        return _offered(scene)
     file, _, function = scene.partition(":")
     module = _loaded(Path(file))
     offered = {
@@ -56,6 +57,19 @@ def scene_function(scene: str) -> Callable[..., Scene]:
             f"{file}:FUNCTION."
         )
     return offered[name]
+
+
+def scene_word(words: list[str]) -> str | None:
+    """The scene among the words of a command line: the first one, or one that is known."""
+    if words and not words[0].startswith("-"):
+        return words[0]
+    known = {*SCENES, *entry_points(group=GROUP).names}
+    return next((word for word in words if word in known or is_file(word)), None)
+
+
+def name_of(scene: str, make: Callable[..., Scene]) -> str:
+    """What results of a scene are called."""
+    return make.__name__ if is_file(scene) else scene
 
 
 def made(make: Callable[..., Scene], settings: Mapping[str, Any]) -> Scene:
@@ -82,8 +96,9 @@ def own_settings(make: Callable[..., Scene], given: Iterable[tuple[str, Any]]) -
         ValueError: if the function has no such setting, or there is no such rule.
     """
     settings, takes = dict(given), inspect.signature(make).parameters
+    any_name = any(p.kind is p.VAR_KEYWORD for p in takes.values())
     for name in settings:
-        if name not in takes:
+        if name not in takes and not any_name:
             raise ValueError(
                 f"--set: the scene has no {name}{meant(name, takes)}; it has {', '.join(takes)}."
             )
@@ -99,6 +114,12 @@ def setting(text: str) -> tuple[str, Any]:
         return name, ast.literal_eval(value)
     except (ValueError, SyntaxError):
         return name, value
+
+
+def unpacked(make: Callable[..., Scene]) -> dict[str, Any]:
+    """Options that spare the packing where only a scene's settings matter."""
+    takes = inspect.signature(make).parameters
+    return {"arrangement": Lattice()} if "arrangement" in takes else {}
 
 
 def argument_lines(make: Callable[..., Scene]) -> dict[str, str]:
@@ -130,16 +151,27 @@ def _told(make: Callable[..., Scene]) -> dict[str, str]:
     return told
 
 
-def meant(name: str, known: Iterable[str]) -> str:
-    """`; did you mean X?` where something known is near."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f" (did you mean {near[0]}?)" if near else ""
-
-
 def _default(value: Any) -> str:
     if value is inspect.Parameter.empty:
         return " (needed)"
     return "" if value is None else f" (default: {value})"
+
+
+def _offered(scene: str) -> Callable[..., Scene]:
+    """A scene of another package."""
+    points = entry_points(group=GROUP)
+    if scene not in points.names:
+        known = (*SCENES, *points.names)
+        raise ValueError(
+            f"scene: {scene!r} is not known{meant(scene, known)}; choose one of "
+            f"{', '.join(known)}, or give a file of your own, as my_scene.py:function."
+        )
+    try:
+        return points[scene].load()
+    except Exception as error:
+        raise ValueError(
+            f"scene: {scene} of {points[scene].value} cannot be loaded ({error})."
+        ) from None
 
 
 def _loaded(path: Path) -> ModuleType:

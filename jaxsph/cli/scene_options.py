@@ -1,85 +1,125 @@
-"""Options that say which scene, and with what settings."""
+"""Options that say which scene, and with what settings: those of its function's signature."""
 
 from __future__ import annotations
 
+import ast
+import inspect
+import sys
+from collections.abc import Callable
 from typing import Any
 
-from ..scenes import SCENES
-from ..scenes.lid_driven_cavity import LIDS
+from jaxsph_command.errors import Parser
+
+from ..scenes import SCENES, Scene
 from ..schemes import SCHEMES
-from .options import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
-from .scene_functions import own_settings, setting
-from .scenes import takes
+from .options import ARRANGEMENTS, SCALES, finite_float, positive_float, positive_int, seed
+from .scene_functions import argument_lines, own_settings, scene_function, scene_word, setting
 
-# options that say what is run, and the scene's name for each; a resumed run has them from its file
-_NAMES = {
-    "resolution": "resolution",
-    "reynolds": "reynolds",
-    "t_end": "end_time",
-    "scale": "scale",
-    "h_over_dx": "h_over_dx",
-    "time_step": "time_step",
-    "arrangement": "arrangement",
-    "seed": "arrangement",
-    "lid": "lid",
-    "scheme": "scheme",
-    "precision": "dtype",
-}
+# settings of most scenes: what each is called there, its option, and how that is read
+_SHARED: dict[str, tuple[str, dict[str, Any]]] = {
+    "resolution": ("--resolution", {"type": positive_int, "metavar": "N",
+                                    "help": "particles per longest side"}),
+    "reynolds": ("--reynolds", {"type": positive_float, "metavar": "RE",
+                                "help": "Reynolds number"}),
+    "end_time": ("--t-end", {"type": positive_float, "metavar": "T", "help": "end time [s]"}),
+    "scale": ("--scale", {"choices": SCALES, "help": "size of the run (default: small)"}),
+    "h_over_dx": ("--h-over-dx", {"type": positive_float, "metavar": "X",
+                                  "help": "smoothing length over spacing"}),
+    "time_step": ("--time-step", {"type": positive_float, "metavar": "DT",
+                                  "help": "time step [s]"}),
+    "arrangement": ("--arrangement", {"choices": tuple(ARRANGEMENTS),
+                                      "help": "how particles start (default: the scene's)"}),
+    "scheme": ("--scheme", {"choices": tuple(SCHEMES),
+                            "help": "discretisation (default: the scene's)"}),
+}  # fmt: skip
+_SEED = {"type": seed, "metavar": "N", "help": "of the arrangement (default: 0)"}
+_NONE: dict[str, Any] = {}
+_KINDS = {"int": int, "float": finite_float, "str": str}
 
 
-def add_scene_options(add) -> None:
-    """Add the scene, and the settings that members of a sweep share."""
+def add_scene_options(parser: Parser, words: list[str], apart: dict[str, Any] = _NONE):
+    """Add the scene, and all settings that the one named among the words can be given.
+
+    Args:
+        parser: of the command.
+        words: of the command line, after the command.
+        apart: how the Reynolds number and the seed, by which members of a sweep differ, are read
+            instead; None where they are no options.
+    """
+    add, scene = parser.add_argument, scene_word(words)
     add("scene", metavar="SCENE",
-        help=f"one of {', '.join(SCENES)}, or a function of your own that returns one, as "
-        "my_scene.py:function")  # fmt: skip
+        help=f"one of {', '.join(SCENES)}; or a function of your own that returns one, as "
+        "my_scene.py:function; with it, --help tells its own settings as well")  # fmt: skip
     add("--set", type=setting, action="append", default=[], metavar="NAME=VALUE",
-        help="any other setting that the scene's function takes (`jaxsph scenes SCENE` lists "
-        "them); may be repeated")  # fmt: skip
-    add("--resolution", type=positive_int, metavar="N", help="particles per longest side")
-    add("--t-end", type=positive_float, metavar="T", help="end time [s]")
-    add("--scale", choices=SCALES, help="size of the run (default: small)")
-    add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
-    add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
-    add(
-        "--arrangement",
-        choices=tuple(ARRANGEMENTS),
-        help="how particles start (default: the scene's)",
-    )
-    add("--lid", choices=tuple(LIDS), help="profile of the lid (default: regularised)")
-    add("--scheme", choices=tuple(SCHEMES), help="discretisation (default: the scene's)")
+        help="any setting that the scene's function takes; may be repeated")  # fmt: skip
+    make = None if scene is None else scene_function(scene)
+    takes = _SHARED if make is None else inspect.signature(make).parameters
+    settings = {}
+    for name, (flag, how) in _SHARED.items():
+        if name in takes and apart.get(name, how) is not None:
+            settings[add(flag, **(how | apart.get(name, {}))).dest] = name
+    if "arrangement" in takes:
+        settings[add("--seed", **(_SEED | apart.get("seed", {}))).dest] = "arrangement"
     add("--precision", choices=("float32", "float64"), help="default: float64")
-
-
-def add_member_options(add) -> None:
-    """Add the settings that tell members of a sweep apart, for one run."""
-    add("--reynolds", type=positive_float, metavar="RE", help="Reynolds number")
-    add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
+    if make is not None:
+        parser.subject = f"scene {scene}"
+        group = parser.add_argument_group(f"settings of {scene} alone")
+        told = argument_lines(make)
+        for name, parameter in takes.items():
+            if parameter.kind is parameter.VAR_KEYWORD or name == "reynolds":
+                continue
+            flag = "--" + name.replace("_", "-")
+            if name not in (*_SHARED, "dtype") and flag not in parser._option_string_actions:
+                how = _read_as(make, parameter)
+                line = told[name].replace("%", "%%")
+                settings[group.add_argument(flag, help=line, **how).dest] = name
+    parser.set_defaults(make=make, named=scene, settings=settings)
 
 
 def given(options) -> list[str]:
     """The settings that are given, as they are typed."""
-    named = [_flag(name) for name in _NAMES if getattr(options, name) is not None]
-    return named + (["--set"] if options.set else [])
+    names = [*options.settings, "precision", "set"]
+    return ["--" + name.replace("_", "-") for name in names if name in options.typed]
 
 
-def scene_settings(options, make, precision: str) -> dict[str, Any]:
+def scene_settings(options, make: Callable[..., Scene], precision: str) -> dict[str, Any]:
     """What is given on the command line, in the scene's own words."""
-    settings = {}
-    for option, name in _NAMES.items():
-        value = getattr(options, option)
-        if value is None:
-            continue
-        if name not in takes(make):
-            raise ValueError(f"{_flag(option)}: scene {options.scene} has no such setting.")
-        settings[name] = value
+    if options.named != options.scene:
+        raise ValueError(f"scene: name {options.scene} before its options.")
+    takes = inspect.signature(make).parameters
+    values = {option: getattr(options, option, None) for option in options.settings}
+    settings = {options.settings[k]: v for k, v in values.items() if v is not None}
     if "arrangement" in settings:
         rule = ARRANGEMENTS[options.arrangement or "packed"]
         settings["arrangement"] = rule(seed=options.seed or 0)
     if "scheme" in settings:
         settings["scheme"] = SCHEMES[options.scheme]
-    settings |= own_settings(make, options.set)
-    return {**settings, "dtype": precision} if "dtype" in takes(make) else settings
+    settings |= dict(options.set)
+    settings = own_settings(make, settings.items())
+    return {**settings, "dtype": precision} if "dtype" in takes else settings
 
 
-def _flag(option: str) -> str:
-    return "--" + option.replace("_", "-")
+def _read_as(make: Callable[..., Scene], parameter: inspect.Parameter) -> dict[str, Any]:
+    """How argparse reads a setting: by its annotation, or by its default where it has none."""
+    metavar = parameter.name.upper()
+    words = getattr(sys.modules.get(make.__module__), f"{metavar}S", None)
+    if isinstance(words, dict):  # LIDS, of all that `lid` can be
+        return {"choices": tuple(words)}
+    kind = parameter.annotation
+    if kind is inspect.Parameter.empty:
+        kind = type(parameter.default)
+    kind = kind if isinstance(kind, str) else inspect.formatannotation(kind)
+    kind = kind.removesuffix(" | None")
+    if kind.startswith("tuple["):
+        parts = kind[len("tuple[") : -1].split(", ")
+        if set(parts) <= set(_KINDS):
+            return {"nargs": len(parts), "type": _KINDS[parts[0]], "metavar": metavar[0]}
+    return {"type": _KINDS.get(kind, _literal), "metavar": metavar}
+
+
+def _literal(text: str) -> Any:
+    """A value as Python writes it, or else a word."""
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text

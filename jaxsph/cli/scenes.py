@@ -1,60 +1,43 @@
-"""`jaxsph scenes`: what can be run."""
+"""`jaxsph scenes SCENE`: what one can be given; with `--scale`, what scenes are once built."""
 
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from collections.abc import Sequence
 
-from ..arrangements import Lattice
 from ..scenes import SCENES
-from .options import SCALES, print_rows
-from .scene_functions import argument_lines, scene_function
+from .options import print_rows
+from .scene_functions import argument_lines, made, scene_function, unpacked
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    scenes = commands.add_parser("scenes", help="list the scenes, their effects and sizes")
-    scenes.set_defaults(command=_list_scenes)
-    scenes.add_argument(
-        "scene",
-        nargs="?",
-        metavar="SCENE",
-        help="tell what this one can be given: a name, or my_scene.py:function",
-    )
-    scenes.add_argument(
-        "--scale", choices=SCALES, action="append", help="sizes to list (default: small)"
-    )
+def tell_scenes(scene: str | None, scales: Sequence[str]) -> int:
+    """Print what a scene can be given, or what it is, or all are, at some scales.
 
-
-def _list_scenes(options) -> int:
-    if options.scene is not None:
-        make = scene_function(options.scene)
-        summary = (inspect.getdoc(make) or "").partition("\n\n")[0]
-        print(f"{options.scene}: {' '.join(summary.split())}")
-        print_rows({f"  {name}": line for name, line in argument_lines(make).items()})
-        return 0
-    for name, make in SCENES.items():
-        print(f"{name}: {(inspect.getdoc(make) or '').partition(chr(10))[0]}")
-        for number, scale in enumerate(options.scale or SCALES[:1]):
-            scene = make(scale=scale, **unpacked(make))
-            if not all(scene.space.box.periodic):  # only periodic scenes pack their particles
-                scene = make(scale=scale)
-            if number == 0:
-                print(f"  effects: {', '.join(effect.name for effect in scene.effects)}")
-            print(
-                f"  {scale:6} {scene.state.position.shape[0]:>7} particles, "
-                f"dx = {scene.space.spacing:.4g} m, "
-                f"h/dx = {scene.space.smoothing_length / scene.space.spacing:.3g}, "
-                f"dt = {scene.time_step:.4g} s, {scene.steps} steps to t = {scene.end_time:g} s"
-            )
+    Args:
+        scene: a name or a file with a function; all scenes if none is given.
+        scales: at which scenes are built.
+    """
+    named = SCENES if scene is None else {scene: scene_function(scene)}
+    for name, make in named.items():
+        summary = (inspect.getdoc(make) or "").partition("\n\n" if scene else "\n")[0]
+        print(f"{name}: {' '.join(summary.split())}")
+        if scene is not None:
+            print_rows({f"  {key}": line for key, line in argument_lines(make).items()})
+        for scale in scales:
+            _tell_built(make, scale)
     return 0
 
 
-def unpacked(make) -> dict[str, Any]:
-    """Options that spare the packing where only a scene's settings matter."""
-    return {"arrangement": Lattice()} if "arrangement" in takes(make) else {}
-
-
-def takes(make):
-    """What a scene's function can be given, by name."""
-    return inspect.signature(make).parameters
+def _tell_built(make, scale: str) -> None:
+    if "scale" not in inspect.signature(make).parameters:
+        raise ValueError("--scale: the scene has none; leave it out.")
+    scene = made(make, {"scale": scale, **unpacked(make)})
+    if not all(scene.space.box.periodic):  # only periodic scenes pack their particles
+        scene = made(make, {"scale": scale})
+    print(
+        f"  {scale:6} {scene.state.position.shape[0]:>7} particles, "
+        f"dx = {scene.space.spacing:.4g} m, "
+        f"h/dx = {scene.space.smoothing_length / scene.space.spacing:.3g}, "
+        f"dt = {scene.time_step:.4g} s, {scene.steps} steps to t = {scene.end_time:g} s\n"
+        f"         effects: {', '.join(effect.name for effect in scene.effects)}"
+    )

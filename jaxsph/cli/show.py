@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
+
+from jaxsph_command.errors import Parser
 
 from ..history import energy_unit, read_history
 from ..io import Overview, check_target, read_overview, read_snapshot, read_walls
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
-from .options import print_rows
+from .options import print_rows, write_json
 from .show_contents import contents, file_format
 
 _SAMPLES = 20  # snapshots that are read of a long run, beside the last one
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    show = commands.add_parser(
-        "show",
-        help="a quick look at a run, or at any other file of this project",
-        description="Tell what a trajectory file holds: the scene, how far the run has come, and "
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Tell what a trajectory file holds: the scene, how far the run has come, and "
         "what its particles do. The file may still be written. Of other files, sweeps, models and "
-        "predictions, tell what is in them.",
+        "predictions, tell what is in them."
     )
-    show.set_defaults(command=_show)
-    add = show.add_argument
+    parser.set_defaults(command=_show)
+    add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, or another file")
     add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
     add("--json", type=Path, metavar="FILE", help="write what is shown to FILE as well")
@@ -42,29 +41,23 @@ def _show(options) -> int:
         if options.figure is not None:
             raise ValueError(f"--figure: {options.file} is no run, so there is nothing to draw.")
         rows = {"file": f"{options.file}, {_size(options.file.stat().st_size)}"}
-        return _tell(rows | contents(options.file), options.json)
+        rows |= contents(options.file)
+        print_rows(rows)
+        write_json(options.json, rows)
+        return 0
     overview = read_overview(options.file)
     measures = _measures(options.file, overview)
     print_rows({"file": f"{options.file}, {_size(overview.size)}", **_rows(overview, measures)})
     if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
         shown = {**vars(overview), **vars(overview.schedule), "steps": overview.schedule.steps}
         del shown["schedule"]
-        options.json.write_text(json.dumps({**shown, **measures}, indent=2) + "\n")
+        write_json(options.json, {**shown, **measures})
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
         walls = read_walls(options.file)
         save(snapshot_figure(*read_snapshot(options.file), walls=walls), options.figure)
         print_rows({"figure": str(options.figure)})
-    return 0
-
-
-def _tell(rows: dict[str, str], target: Path | None) -> int:
-    print_rows(rows)
-    if target is not None:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(json.dumps(rows, indent=2) + "\n")
     return 0
 
 

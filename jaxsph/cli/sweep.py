@@ -10,41 +10,48 @@ from pathlib import Path
 import jax
 import numpy as np
 
+from jaxsph_command.config import NAME, write_config
+from jaxsph_command.errors import Parser
+
 from ..integrate import explanation
+from ..io import check_target
 from ..progress import progress_bar
 from ..sweeps import sweep
-from .options import positive_int, print_rows, reynolds_numbers, seed
-from .scene_functions import is_file, made, scene_function
+from .options import positive_int, print_rows, result_file, reynolds_numbers, write_json
+from .scene_functions import made, name_of, scene_function
 from .scene_options import add_scene_options, scene_settings
 
 _FAULTS_SHOWN = 5
+_APART = {
+    "reynolds": {"type": reynolds_numbers, "nargs": "+", "required": True, "help": "Reynolds "
+                 "numbers, or START:STOP:COUNT for COUNT of them, evenly spaced"},
+    "seed": {"nargs": "+"},
+}  # fmt: skip
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    command = commands.add_parser(
-        "sweep",
-        help="run a scene at many Reynolds numbers and seeds",
-        description="Run full models of a scene at all pairs of the Reynolds numbers and seeds "
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Run full models of a scene at all pairs of the Reynolds numbers and seeds "
         "given, on all devices, and write them to one file, each with its status. The same command "
-        "goes on where it was cut short.",
+        "goes on where it was cut short."
     )
-    command.set_defaults(command=_sweep)
-    add = command.add_argument
-    add_scene_options(add)
-    add("--reynolds", type=reynolds_numbers, nargs="+", required=True, metavar="RE",
-        help="Reynolds numbers, or START:STOP:COUNT for COUNT of them, evenly spaced")  # fmt: skip
-    add("--seed", type=seed, nargs="+", metavar="N", help="of the arrangement (default: 0)")
+    parser.set_defaults(command=_sweep)
+    add = parser.add_argument
+    add_scene_options(parser, words, _APART)
     add("--batch", type=positive_int, default=1, metavar="K",
         help="members that a device runs side by side; more than one pays on an accelerator "
         "(default: %(default)s)")  # fmt: skip
-    add("--out", type=Path, metavar="FILE", help="default: out/SCENE/sweep.h5")
+    add("--out", type=Path, metavar="DIR", help="folder of the results, or a file "
+        "ending with .h5 (default: out/SCENE)")
+    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
 
 
 def _sweep(options) -> int:
-    make = scene_function(options.scene)
-    name = make.__name__ if is_file(options.scene) else options.scene
-    path = options.out or Path("out", name, "sweep.h5")
+    make = options.make or scene_function(options.scene)
+    path = result_file(options.out, Path("out", name_of(options.scene, make)), "sweep.h5")
+    if options.json is not None:
+        check_target(options.json)
     precision = options.precision or "float64"
     pairs = itertools.product(sum(options.reynolds, []), options.seed or [None])
     with jax.enable_x64(precision == "float64"):
@@ -54,6 +61,7 @@ def _sweep(options) -> int:
             scenes.append(made(make, scene_settings(member, make, precision)))
         before = clock.perf_counter()
         with progress_bar(len(scenes), "run") as bar:
+            write_config(path.with_name(NAME), options)
             status = sweep(scenes, path, batch=options.batch, progress=bar.update)
     lost = np.flatnonzero(status.code)
     for number in lost[:_FAULTS_SHOWN]:
@@ -61,13 +69,13 @@ def _sweep(options) -> int:
             f"member {number} (Re {status.parameters[number]['reynolds']:g}): step "
             f"{status.step[number]}: {explanation(int(status.code[number]))}."
         )
-    print_rows(
-        {
-            "members": f"{len(scenes)}, {len(lost)} lost",
-            "particles": f"{scenes[0].state.density.shape[0]} each",
-            "steps": f"{scenes[0].steps}, to t = {scenes[0].end_time:g} s",
-            "time": f"{clock.perf_counter() - before:.3g} s, compilation in it",
-            "sweep": str(path),
-        }
-    )
+    rows = {
+        "members": f"{len(scenes)}, {len(lost)} lost",
+        "particles": f"{scenes[0].state.density.shape[0]} each",
+        "steps": f"{scenes[0].steps}, to t = {scenes[0].end_time:g} s",
+        "time": f"{clock.perf_counter() - before:.3g} s, compilation in it",
+        "sweep": str(path),
+    }
+    print_rows(rows)
+    write_json(options.json, rows)
     return 1 if len(lost) == len(scenes) else 0

@@ -25,7 +25,9 @@ def smoothing_sum(pair, i, j):
 _SMOOTHING = (PairTerm("smoothing_sum", ("value",), smoothing_sum),)
 
 
-def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Scene:
+def balanced(
+    scene: Scene, tolerance: float = 1e-2, iterations: int = 200, near: Scene | None = None
+) -> Scene:
     """The scene with densities at the start whose pressure balances the flow:
 
         S d^2 rho / dt^2 = 0    for rho = rho_given + S z, at the same mean density.
@@ -40,15 +42,25 @@ def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Sc
         scene: periodic; its positions and velocities stay, its densities are a first guess.
         tolerance: of the residual, relative to that of the densities given.
         iterations: at most.
+        near: a balanced scene of the same particles, from whose densities the solver sets out; it
+            is there at once where the two differ in viscosity alone.
 
     Raises:
         ValueError: if the scene has walls, or no better balance is found.
     """
     if scene.walls is not None:
         raise ValueError("balanced: a scene with walls starts from rest; leave it as it is.")
+    guess = scene.state.density
+    if near is not None:
+        if near.state.density.shape != guess.shape:
+            raise ValueError(
+                f"near: has {len(near.state.density)} particles, the scene {len(guess)}; balance "
+                "it by itself."
+            )
+        guess = near.state.density + (jnp.mean(guess) - jnp.mean(near.state.density))
     neighbors = scene.search().build(scene.state.position)
     density, before, after = _solved(
-        scene.functional(), scene.state, neighbors, tolerance, iterations
+        scene.functional(), scene.state, guess, neighbors, tolerance, iterations
     )
     if not float(after) <= float(before):  # a NaN too
         raise ValueError(
@@ -60,7 +72,7 @@ def balanced(scene: Scene, tolerance: float = 1e-2, iterations: int = 200) -> Sc
 
 
 @eqx.filter_jit
-def _solved(functional, state, neighbors, tolerance: float, iterations: int):
+def _solved(functional, state, guess, neighbors, tolerance: float, iterations: int):
     space, time = functional.space, jnp.zeros((), state.density.dtype)
     volume = jnp.full_like(state.density, space.spacing**space.box.dim)
     itself = space.kernel.value(time, space.smoothing_length, space.box.dim)
@@ -78,12 +90,13 @@ def _solved(functional, state, neighbors, tolerance: float, iterations: int):
         rates = functional(time, start, neighbors)
         return jax.jvp(lambda s: functional(time, s, neighbors).density, (start,), (rates,))[1]
 
-    residual, slope = jax.linearize(second_derivative, state.density)
+    before = jnp.linalg.norm(smoothed(second_derivative(state.density)))
+    residual, slope = jax.linearize(second_derivative, guess)
 
     def operator(change):  # minus a smoothed Laplacian times c0^2: positive
         return -smoothed(slope(smoothed(change)))
 
     wanted = smoothed(residual)
-    change, _ = cg(operator, wanted, tol=tolerance, maxiter=iterations)
+    change, _ = cg(operator, wanted, tol=0.0, atol=tolerance * before, maxiter=iterations)
     left = wanted - operator(change)
-    return state.density + smoothed(change), jnp.linalg.norm(wanted), jnp.linalg.norm(left)
+    return guess + smoothed(change), before, jnp.linalg.norm(left)

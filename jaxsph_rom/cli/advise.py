@@ -9,21 +9,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jaxsph.cli import print_rows
+from jaxsph.cli import Parser, print_rows
 from jaxsph.io import check_target
 
 from .. import advice
 from ..advice import Advice, Row
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    parser = commands.add_parser(
-        "advise",
-        help="which setting to use for a wanted accuracy or time",
-        description="Say from measurements that came with the package which full or reduced model "
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Say from measurements that came with the package which full or reduced model "
         "is the cheapest within the errors given, or the most accurate within a time; and how to "
-        "run it. Times are of the machine that the answer names. Exit code 1: none is within.",
+        "run it. Times are of the machine that the answer names. Exit code 1: none is within."
     )
     parser.set_defaults(command=_advise)
     add = parser.add_argument

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import inspect
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
+import numpy as np
 
-from jaxsph.cli import ARRANGEMENTS, SCALES, positive_float, positive_int, seed
-from jaxsph.scenes import SCENES, Scene
-from jaxsph.schemes import SCHEMES
+from jaxsph.cli import ARRANGEMENTS, Parser, positive_float, reynolds_numbers
+from jaxsph.cli.scene_functions import made, unpacked
+from jaxsph.cli.scene_options import add_scene_options, scene_settings
+from jaxsph.progress import progress_bar
+from jaxsph.scenes import Scene
+from jaxsph_command.errors import meant
 
 from ..basis import Energy, Euclidean
 from ..points import Compressible, Family, Formulation, Solenoidal
@@ -24,40 +27,32 @@ from ..study import PLANS, Plan, quiet
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 CLOSURES = ("none", "linear")
 FORMULATIONS = ("compressible", "solenoidal")
-KNOWN = tuple(n for n, make in SCENES.items() if "reynolds" in inspect.signature(make).parameters)
 
 
-def add_training_options(add) -> None:
+def add_training_options(parser: Parser, words: list[str]) -> None:
     """What full runs are made and how they are reduced."""
-    add("scene", metavar="SCENE", help=f"one of {', '.join(KNOWN)}")
-    add("--train", type=positive_float, nargs="+", metavar="RE",
-        help=f"Reynolds numbers to train on ({defaults('train')})")  # fmt: skip
+    add = parser.add_argument
+    add_scene_options(parser, words, {"reynolds": None})
+    add("--train", type=training_values, nargs="+", metavar="RE",
+        help=f"Reynolds numbers to train on ({defaults('train')}), or START:STOP:COUNT; or other "
+        "parameters of the scene, as NAME=VALUE,VALUE; all combinations are run")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="energy",
         help="of POD and projection (default: energy; euclidean is the paper's)")  # fmt: skip
-    add("--scheme", choices=tuple(SCHEMES), help="of the full model (default: the scene's)")
-    add("--scale", choices=SCALES, default="small", help="size of the runs (default: small)")
-    add("--resolution", type=positive_int, metavar="N", help="particles per longest side")
-    add("--h-over-dx", type=positive_float, metavar="X", help="smoothing length over spacing")
-    add("--time-step", type=positive_float, metavar="DT", help="time step [s]")
-    add("--t-end", type=positive_float, metavar="T", help="end time [s]")
     add("--settling", type=positive_float, metavar="T",
         help="time a run from rest takes before the studied time begins [s] "
         f"({defaults('settling')}; other scenes start from rest)")  # fmt: skip
-    add("--arrangement", choices=tuple(ARRANGEMENTS), help="how particles start (default: the "
-        "scene's; for models on reference points stirred where there are no walls)")  # fmt: skip
-    add("--seed", type=seed, metavar="N", help="of the arrangement (default: 0)")
-    add("--precision", choices=("float32", "float64"), default="float64",
-        help="default: %(default)s")  # fmt: skip
+    parser.set_defaults(precision="float64")
 
 
-def add_closure_options(add, default: str) -> None:
+def add_closure_options(add, default: str | None) -> None:
     """How models on reference points are formulated and closed."""
     add("--formulation", choices=FORMULATIONS,
         help="of models on reference points: the compressible equations as they are, or solenoidal "
         "modes with the pressure recovered (default: solenoidal between walls "
         "without a closure)")  # fmt: skip
     add("--closure", choices=CLOSURES, default=default,
-        help="of models on reference points (default: %(default)s)")  # fmt: skip
+        help="of models on reference points (default: "
+        f"{default or 'none where --hyper is given'})")  # fmt: skip
     add("--held-back", type=positive_float, metavar="RE",
         help="training Reynolds number that only judges the closure (default: an inner one where "
         "there are four or more)")  # fmt: skip
@@ -74,17 +69,57 @@ def defaults(name: str) -> str:
     return "default: " + "; ".join(f"{text} for {', '.join(s)}" for text, s in found.items())
 
 
-def check_scene(options) -> None:
-    """A ValueError if there is no such scene."""
-    if options.scene not in SCENES:
-        raise ValueError(
-            f"scene {options.scene!r} is not known; choose one of {', '.join(KNOWN)}."
-        )
-    if options.scene not in KNOWN:
-        raise ValueError(
-            f"scene {options.scene} has no Reynolds number; choose one of {', '.join(KNOWN)}, or "
-            "train on parameters of its own by jaxsph_rom.train."
-        )
+def training_values(text: str) -> tuple[str, tuple[float, ...]]:
+    """A parameter's name and values, of Reynolds numbers without the name."""
+    return named_numbers(text) if "=" in text else ("reynolds", tuple(reynolds_numbers(text)))
+
+
+def named_numbers(text: str) -> tuple[str, tuple[float, ...]]:
+    """A parameter's name and values."""
+    name, equals, values = text.partition("=")
+    found: list[float] = []
+    for part in values.split(","):
+        try:
+            if part.count(":") == 2:
+                low, high, count = part.split(":")
+                found += np.linspace(float(low), float(high), int(count)).tolist()
+            else:
+                found.append(float(part))
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"NAME=VALUE with numbers, got {text!r}") from None
+    if not name or not equals or not found or not np.isfinite(found).all():
+        raise argparse.ArgumentTypeError(f"NAME=VALUE with finite numbers, got {text!r}")
+    return name, tuple(found)
+
+
+def by_name(given: Iterable[tuple[str, tuple[float, ...]]]) -> dict[str, tuple[float, ...]]:
+    """Values of each parameter that is named, each once."""
+    found: dict[str, tuple[float, ...]] = {}
+    for name, values in given:
+        found[name] = distinct((*found.get(name, ()), *values))
+    return found
+
+
+def trained_at(options) -> dict[str, tuple[float, ...]] | None:
+    """Values of each parameter to train on, if any are given, which the scene must take."""
+    takes = inspect.signature(options.make).parameters
+    any_name = any(p.kind is p.VAR_KEYWORD for p in takes.values())
+    values = None if options.train is None else by_name(options.train)
+    for name in values or {"reynolds": ()}:
+        if name not in takes and not any_name:
+            raise ValueError(
+                f"--train: scene {options.scene} has no {name}{meant(name, takes)}; give others of "
+                f"its parameters, as NAME=VALUE,VALUE: it has {', '.join(takes)}."
+            )
+        if name in settings_given(options):
+            raise ValueError(f"--train: {name} is given as a setting too; leave one out.")
+    return values
+
+
+def settings_given(options) -> tuple[str, ...]:
+    """Settings that are the same in all runs, by the scene's names."""
+    given = [name for k, name in options.settings.items() if getattr(options, k, None) is not None]
+    return (*given, *dict(options.set))
 
 
 def formulation(options) -> Formulation | None:
@@ -137,71 +172,72 @@ def distinct(values) -> tuple[float, ...]:
 def scene_maker(
     options,
     plan: Plan,
-    reynolds: tuple[float, ...],
+    points: Sequence[Mapping[str, float]],
     folder: Path,
     on_points: bool,
     check: Callable[[Scene], None] | None = None,
     trained: Callable[[Family], None] | None = None,
 ) -> Family:
-    """The scenes of any Reynolds number; bad input is met before the packing.
+    """The scenes of any parameters; bad input is met before the packing.
 
     Args:
         options: of the command.
         plan: of the scene.
-        reynolds: Reynolds numbers that will be run.
+        points: parameters that will be run.
         folder: where runs that settle are kept.
         on_points: whether models on reference points are made of the runs. Flows without walls
             then start from stirred particles at a balanced pressure.
         check: what else must hold of the scene, with its particles on a lattice.
         trained: what must hold of the scenes that are trained on, likewise.
     """
-    make = SCENES[options.scene]
-    settings = {
-        "scale": options.scale,
-        "resolution": options.resolution,
-        "h_over_dx": options.h_over_dx,
-        "time_step": options.time_step,
-        "dtype": options.precision,
-    }
-    if options.scheme is not None:
-        settings["scheme"] = SCHEMES[options.scheme]
-    if options.t_end is not None:
-        settings["end_time"] = options.t_end
+    make = options.make
+    settings = scene_settings(options, make, options.precision)
+    settings.pop("arrangement", None)
     plan.scenes(make, folder, bar)  # refuses to let what starts from rest settle
     started = {} if plan.settling is None else {"start_time": plan.settling}
-    lattice = ARRANGEMENTS["lattice"](seed=0)
-    plain = partial(make, arrangement=lattice, **started, **settings)
-    for number in reynolds:
-        cheap = plain(reynolds=number)
+    lattice = unpacked(make)
+
+    def plain(**parameters):
+        return made(make, {**settings, **lattice, **started, **parameters})
+
+    for point in points:
+        cheap = plain(**point)
         plan.probes(cheap)
     if trained is not None:
-        trained(Family(lambda reynolds: plain(reynolds=reynolds)))
+        trained(Family(plain))
     if check is not None:
         check(cheap)
-    start_quiet = on_points and cheap.walls is None
-    arrangement = options.arrangement or ("stirred" if start_quiet else None)
-    if arrangement is not None or options.seed is not None:
+    start_quiet = on_points and cheap.walls is None and bool(lattice)
+    arrangement = options.arrangement if lattice else None
+    arrangement = arrangement or ("stirred" if start_quiet else None)
+    if lattice and (arrangement is not None or options.seed is not None):
         rule = ARRANGEMENTS[arrangement or "packed"]
         settings["arrangement"] = rule(seed=options.seed or 0)
-    scene = plan.scenes(partial(make, **settings), folder, bar)
-    looked_at = partial(make, **started, **settings)
 
-    def started_quietly(reynolds):
-        found = scene(reynolds=reynolds)
-        return quiet(found) if start_quiet else found
+    def whole(**named):
+        return made(make, {**settings, **named})
+
+    whole.__signature__ = inspect.signature(make)  # by which a plan knows what it can be given
+    scene = plan.scenes(whole, folder, bar)
+
+    usual = not any(p.default is p.empty for p in whole.__signature__.parameters.values())
+
+    @cache  # to balance a pressure takes as long as many steps
+    def started_quietly(**parameters):
+        found = scene(**parameters)
+        if not start_quiet:
+            return found
+        return quiet(found, started_quietly() if usual and parameters else None)
 
     return Family(
         started_quietly,
         starts=plan.settling is None,
-        probe=None if plan.settling is None else lambda reynolds: looked_at(reynolds=reynolds),
+        probe=None if plan.settling is None else lambda **named: whole(**started, **named),
     )
 
 
 @contextmanager
 def bar(label: str, total: int, done: int = 0):
     """A progress bar on stderr; gives the function to report steps to."""
-    interval = 0.1 if sys.stderr.isatty() else 10.0  # spare log files
-    with tqdm(
-        desc=label, total=total, initial=done, unit="step", file=sys.stderr, mininterval=interval
-    ) as shown:
+    with progress_bar(total, "step", done, label) as shown:
         yield shown.update

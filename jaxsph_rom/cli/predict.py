@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import sys
@@ -13,7 +12,15 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxsph.cli import fail, positive_float, positive_int, print_rows, reynolds_numbers, seed
+from jaxsph.cli import (
+    Parser,
+    fail,
+    positive_float,
+    positive_int,
+    print_rows,
+    reynolds_numbers,
+    seed,
+)
 from jaxsph.cli.options import MOST_NUMBERS
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
@@ -22,7 +29,7 @@ from jaxsph.io import check_target
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
 from ..report.plain import plain
-from .options import bar, distinct, said
+from .options import bar, by_name, named_numbers, said
 from .train import print_errors
 
 _MOST_FILES = 100  # with fields or tracers
@@ -30,16 +37,14 @@ _MOST_BYTES = 4 * 2**30  # of all coordinates
 _FAULTS_SHOWN = 5
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    predict = commands.add_parser(
-        "predict",
-        help="run the file of a reduced model at any parameters",
-        description="Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
-        "of parameters at once, and write their coordinates over time to DIR/prediction.h5.",
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
+        "of parameters at once, and write their coordinates over time to DIR/prediction.h5."
     )
-    predict.set_defaults(command=_predict)
-    add = predict.add_argument
+    parser.set_defaults(command=_predict)
+    add = parser.add_argument
     add("model", type=Path, metavar="FILE", help="of the model")
     add("--reynolds", type=reynolds_numbers, nargs="+", metavar="RE",
         help="Reynolds numbers, or START:STOP:COUNT for COUNT of them, evenly spaced")  # fmt: skip
@@ -87,31 +92,9 @@ def _predict(options) -> int:
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
 
-def named_numbers(text: str) -> tuple[str, tuple[float, ...]]:
-    """A parameter's name and values."""
-    name, equals, values = text.partition("=")
-    found: list[float] = []
-    for part in values.split(","):
-        try:
-            if part.count(":") == 2:
-                low, high, count = part.split(":")
-                found += np.linspace(float(low), float(high), int(count)).tolist()
-            else:
-                found.append(float(part))
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"NAME=VALUE with numbers, got {text!r}") from None
-    if not name or not equals or not found or not np.isfinite(found).all():
-        raise argparse.ArgumentTypeError(f"NAME=VALUE with finite numbers, got {text!r}")
-    return name, tuple(found)
-
-
 def _points(options, trained: TrainedModel) -> np.ndarray:
     """A row of parameters a member."""
-    given: dict[str, tuple[float, ...]] = {}
-    if options.reynolds is not None:
-        given["reynolds"] = distinct(value for part in options.reynolds for value in part)
-    for name, values in options.at or ():
-        given[name] = distinct((*given.get(name, ()), *values))
+    given = by_name([*(("reynolds", v) for v in options.reynolds or ()), *(options.at or ())])
     if set(given) != set(trained.names):
         wanted = " ".join(f"{name}=..." for name in trained.names)
         raise ValueError(f"--at: give a value of each parameter of the model: --at {wanted}")

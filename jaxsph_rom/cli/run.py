@@ -7,11 +7,13 @@ from pathlib import Path
 
 import jax
 
-from jaxsph.cli import fail, positive_float, positive_int
+from jaxsph.cli import Parser, fail, positive_float, positive_int
+from jaxsph.cli.scene_functions import name_of
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
+from jaxsph_command.config import NAME, write_config
 
 from ..field_advection import ConsistentAdvection, Gauged, ModeAdvection, PaperAdvection
 from ..lattice_polynomials import LatticePolynomials
@@ -27,19 +29,19 @@ from ..projection import (
 from ..report import format_table
 from ..splines import LocalSplines
 from ..still_walls import check_still
-from ..study import OnParticles, OnPoints, Plan, Study, write_study
+from ..study import PLANS, OnParticles, OnPoints, Plan, Study, write_study
 from .options import (
     PRODUCTS,
     add_closure_options,
     add_training_options,
     bar,
     check_closure,
-    check_scene,
     defaults,
     distinct,
     formulation,
     planned,
     scene_maker,
+    trained_at,
 )
 
 MAPS = {"shepard": ShepardMap, "mls": MovingLeastSquaresMap, "quadratic": QuadraticMap}
@@ -58,18 +60,16 @@ HYPER = ("none", "tensor")
 MEMORIES = {rule.name: rule for rule in (SpectralMemory(), ConvectiveMemory())}
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    run = commands.add_parser(
-        "run",
-        help="train, predict, compare with the full model",
-        description="Run full models, build reduced models from them, run these at other Reynolds "
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Run full models, build reduced models from them, run these at other Reynolds "
         "numbers, and compare: a table of errors and times, figures, report.json and report.html. "
-        "Runs are kept in the output folder: the same command goes on where it was cut short.",
+        "Runs are kept in the output folder: the same command goes on where it was cut short."
     )
-    add = run.add_argument
-    add_training_options(add)
-    run.set_defaults(command=_run, inner_product=None)
+    add = parser.add_argument
+    add_training_options(parser, words)
+    parser.set_defaults(command=_run, inner_product=None)
     add("--predict", type=positive_float, nargs="+", metavar="RE",
         help=f"Reynolds numbers to run at ({defaults('predict')})")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", metavar="M",
@@ -77,9 +77,10 @@ def add_to(commands) -> None:
     add("--borders", type=positive_float, nargs="+", metavar="RE",
         help="borders of local bases over Re; two around all of them make one global basis "
         f"({defaults('borders')}; else a global basis)")  # fmt: skip
-    add("--hyper", choices=HYPER, nargs="+", default=["none"],
+    add("--hyper", choices=HYPER, nargs="+",
         help="models on moving particles (none), on reference points (tensor), or both; with "
-        "tensor all runs start quietly (default: none)")  # fmt: skip
+        "tensor all runs start quietly (default: both of taylor-green, with a linear closure; "
+        "else none)")  # fmt: skip
     add("--projection", choices=PROJECTIONS, nargs="+", default=["galerkin"],
         help="Galerkin, adjoint Petrov-Galerkin, or both, on moving particles (default: "
         "galerkin)")  # fmt: skip
@@ -103,7 +104,7 @@ def add_to(commands) -> None:
         "particles start on a lattice, which cost less (default: %(default)s)")  # fmt: skip
     add("--spline-order", type=positive_int, default=3, metavar="K",
         help="of the splines or polynomials (default: %(default)s)")  # fmt: skip
-    add_closure_options(add, default="none")
+    add_closure_options(add, default=None)
     add("--slice", type=float, dest="slice_at", metavar="X",
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
         "0.25)")  # fmt: skip
@@ -124,8 +125,7 @@ def memory_length(text: str) -> float | MemoryLength:
 
 
 def _run(options) -> int:
-    check_scene(options)
-    folder = Path("out", f"rom-{options.scene}") if options.out is None else options.out
+    folder = options.out or Path("out", f"rom-{name_of(options.scene, options.make)}")
     report = folder / "report.json" if options.json is None else options.json
     check_target(report)
     check_target(folder / "report.json")
@@ -133,6 +133,11 @@ def _run(options) -> int:
     for name, value in (PAPERS if options.faithful else BEST).items():
         if getattr(options, name) is None:
             setattr(options, name, value)
+    usual = PLANS.get(options.scene)
+    if options.hyper is None:
+        options.hyper = ["none"] if usual is None or options.faithful else list(usual.hyper)
+        options.closure = options.closure or ("linear" if "tensor" in options.hyper else "none")
+    options.closure = options.closure or "none"
     with jax.enable_x64(options.precision == "float64"):
         plan = _plan(options)
         experiments = plan.experiments()
@@ -143,6 +148,7 @@ def _run(options) -> int:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
+        write_config(folder / NAME, options)
         write_study(study, experiments, outcomes, folder, report)
     print(format_table([outcome.case for outcome in outcomes]))
     if plan.judged_from:
@@ -154,12 +160,18 @@ def _run(options) -> int:
 def _plan(options) -> Plan:
     given = {
         name: distinct(getattr(options, name))
-        for name in ("train", "predict", "modes", "borders")
+        for name in ("predict", "modes", "borders")
         if getattr(options, name) is not None
     }
     for name in ("slice_at", "settling"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
+    values = trained_at(options)
+    if values is not None:
+        if set(values) != {"reynolds"}:
+            raise ValueError("--train: models are compared over Reynolds numbers; of other "
+                             "parameters make one by jaxsph-rom train.")  # fmt: skip
+        given["train"] = values["reynolds"]
     if {"train", "predict"} & set(given) and "borders" not in given:
         given["borders"] = None  # the plan's borders belong to its own Reynolds numbers
     return planned(options, ("train", "predict", "modes"), given)
@@ -183,12 +195,12 @@ def _study(options, plan: Plan, folder: Path) -> Study:
         for experiment in experiments if on_points else ():
             check_family(family, [{"reynolds": re} for re in experiment.trained_on])
 
-    reynolds = (*plan.train, *plan.predict)
-    family = scene_maker(options, plan, reynolds, folder, on_points, check, trained)
+    points = [{"reynolds": number} for number in (*plan.train, *plan.predict)]
+    family = scene_maker(options, plan, points, folder, on_points, check, trained)
     fixed = OnPoints(formulation(options), moving.product, closed, options.held_back, family)
     methods = {"none": moving, "tensor": fixed}
     return Study(
-        family.make,
+        lambda reynolds: family.make(reynolds=reynolds),
         folder,
         *(methods[name] for name in methods if name in options.hyper),
         progress=bar,

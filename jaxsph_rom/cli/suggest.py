@@ -8,24 +8,22 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from jaxsph.cli import print_rows
+from jaxsph.cli import Parser, print_rows
 from jaxsph.io import check_target
 
 from ..points import load
 from .options import said
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    suggest = commands.add_parser(
-        "suggest",
-        help="where a reduced model needs its next training run",
-        description="Name the parameters within the training range at which the error that a model "
-        "expects of itself is largest.",
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Name the parameters within the training range at which the error that a model "
+        "expects of itself is largest."
     )
-    suggest.set_defaults(command=_suggest)
-    suggest.add_argument("model", type=Path, metavar="FILE", help="of the model")
-    suggest.add_argument("--json", type=Path, metavar="FILE", help="write it to FILE as well")
+    parser.set_defaults(command=_suggest)
+    parser.add_argument("model", type=Path, metavar="FILE", help="of the model")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write it to FILE as well")
 
 
 def _suggest(options) -> int:

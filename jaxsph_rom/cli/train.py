@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import jax
 
 from jaxsph import Trajectory
-from jaxsph.cli import fail, positive_int, print_rows
+from jaxsph.cli import Parser, fail, positive_int, print_rows
+from jaxsph.cli.options import result_file
+from jaxsph.cli.scene_functions import name_of
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
+from jaxsph_command.config import NAME, write_config
 
 from ..points import (
     Family,
@@ -35,29 +39,26 @@ from .options import (
     add_training_options,
     bar,
     check_closure,
-    check_scene,
-    distinct,
     formulation,
     planned,
     said,
     scene_maker,
+    trained_at,
 )
 
 REDUCTIONS = {"tensors": Tensors(), "samples": Samples()}
 
 
-def add_to(commands) -> None:
-    """Add the command to a parser's commands."""
-    train = commands.add_parser(
-        "train",
-        help="make a reduced model on reference points, as a file",
-        description="Run full models, make a reduced model on reference points from them, and "
+def add_to(parser: Parser, words: list[str]) -> None:
+    """Add the command's options to its parser."""
+    parser.description = (
+        "Run full models, make a reduced model on reference points from them, and "
         "write it to a file from which `jaxsph-rom predict` runs it at any Reynolds number. Full "
-        "runs are kept: the same command goes on where it was cut short.",
+        "runs are kept: the same command goes on where it was cut short."
     )
-    train.set_defaults(command=_train)
-    add = train.add_argument
-    add_training_options(add)
+    parser.set_defaults(command=_train)
+    add = parser.add_argument
+    add_training_options(parser, words)
     add("--modes", type=positive_int, default=10, metavar="M",
         help="number of modes (default: %(default)s)")  # fmt: skip
     add("--reduction", choices=tuple(REDUCTIONS), default="tensors",
@@ -67,32 +68,38 @@ def add_to(commands) -> None:
     add("--closure-iterations", type=positive_int, default=600, metavar="K",
         help="of the closure's training (default: %(default)s)")  # fmt: skip
     add("--runs", type=Path, metavar="DIR",
-        help="where full runs are kept (default: out/train-SCENE)")  # fmt: skip
-    add("--out", type=Path, metavar="FILE", help="of the model (default: DIR/model.h5)")
+        help="where full runs are kept (default: --out, or out/train-SCENE)")  # fmt: skip
+    add("--out", type=Path, metavar="DIR", help="folder of the model and its "
+        "full runs, or a file ending with .h5 (default: out/train-SCENE)")
     add("--json", type=Path, metavar="FILE", help="write what it cost to FILE as well")
 
 
 def _train(options) -> int:
-    check_scene(options)
-    folder = Path("out", f"train-{options.scene}") if options.runs is None else options.runs
-    path = folder / "model.h5" if options.out is None else options.out
+    usual = Path("out", f"train-{name_of(options.scene, options.make)}")
+    path = result_file(options.out, options.runs or usual, "model.h5")
+    folder = options.runs or (usual if options.out in (None, path) else options.out)
     for target in (path, options.json):
         if target is not None:
             check_target(target)
     with jax.enable_x64(options.precision == "float64"):
-        plan = _plan(options)
+        values = trained_at(options)
+        plan = _plan(options, values)
         check_closure(options)
         reduction = REDUCTIONS[options.reduction]
-        parameters = [{"reynolds": number} for number in sorted(plan.train, reverse=True)]
+        parameters = _points(values or {"reynolds": plan.train})
         closure = _closure(options, parameters)
 
         def check(family: Family) -> None:
             check_family(family, parameters, (options.modes,), closure, reduction)
 
         try:
-            family = scene_maker(options, plan, plan.train, folder, True, trained=check)
+            family = scene_maker(options, plan, parameters, folder, True, trained=check)
             scenes = [family.scene(named) for named in parameters]
-            runs = [full_run(folder / "full", scene, bar) for scene in scenes]
+            names = [None if set(named) == {"reynolds"} else said(named) for named in parameters]
+            runs = [
+                full_run(folder / "full", scene, bar, name)
+                for scene, name in zip(scenes, names, strict=True)
+            ]
             made_as = formulation(options)
             if made_as is None:
                 product = PRODUCTS[options.inner_product]()
@@ -111,6 +118,7 @@ def _train(options) -> int:
             | {"inner_product": options.inner_product, "full_seconds": _seconds(scenes, runs)},
         )
         trained.save(path)
+        write_config(path.with_name(NAME), options)
     if options.json is not None:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         results = plain(_results(trained, path))
@@ -119,8 +127,16 @@ def _train(options) -> int:
     return 0
 
 
-def _plan(options) -> Plan:
-    given: dict[str, Any] = {} if options.train is None else {"train": distinct(options.train)}
+def _points(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
+    """All combinations, from the largest values on."""
+    ordered = [sorted(of, reverse=True) for of in values.values()]
+    return [dict(zip(values, point, strict=True)) for point in product(*ordered)]
+
+
+def _plan(options, values: dict[str, tuple[float, ...]] | None) -> Plan:
+    given: dict[str, Any] = {}
+    if values is not None:
+        given["train"] = values.get("reynolds", ())
     if options.settling is not None:
         given["settling"] = options.settling
     return planned(options, ("train",), given)
@@ -131,12 +147,12 @@ def _closure(options, parameters) -> LinearClosure | None:
         return None
     judge = held_back(parameters)
     if options.held_back is not None:
-        judge = {"reynolds": options.held_back}
+        judge = {name: options.held_back for name in parameters[0]}
         if judge not in parameters or len(parameters) < 2:
-            known = ", ".join(f"{named['reynolds']:g}" for named in reversed(parameters))
+            known = "; ".join(said(named) for named in reversed(parameters))
             raise ValueError(
-                f"--held-back: Re {options.held_back:g} must be one of at least two training "
-                f"Reynolds numbers, which are {known}."
+                f"--held-back: {said(judge)} must be one of at least two training "
+                f"points, which are {known}."
             )
     return LinearClosure(judge, iterations=options.closure_iterations)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ class Plan:
         borders: of local bases over the Reynolds number; one global basis if none are given.
         slice_at: x of the vertical line of probes [m]; the centre line if none is given.
         judged_from: time from which on discrepancies count [s].
+        hyper: what is compared, models on moving particles (none), on reference points (tensor).
         settling: time [s] that a run from rest takes before the studied time begins.
     """
 
@@ -40,6 +42,7 @@ class Plan:
     slice_at: float | None = None
     judged_from: float = 0.0
     settling: float | None = None
+    hyper: tuple[str, ...] = ("none",)
 
     def experiments(self) -> tuple[Experiment, ...]:
         """One experiment with a global basis, or one for each local basis.
@@ -83,7 +86,7 @@ class Plan:
 
 _DECAYING = Plan((100.0, 150.0, 200.0, 250.0), (125.0, 175.0, 225.0), (3,), 1e-4)
 PLANS = {
-    "taylor-green": _DECAYING,
+    "taylor-green": dataclasses.replace(_DECAYING, hyper=("none", "tensor")),
     "taylor-green-3d": _DECAYING,
     "lid-driven-cavity": Plan(
         (50.0, 100.0, 150.0, 200.0),

@@ -17,8 +17,16 @@ from jaxsph.scenes import Scene
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[int], None]]]
 
 
-def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
+def full_run(
+    folder: Path, scene: Scene, progress: Progress, name: str | None = None
+) -> Trajectory:
     """The full model's trajectory, kept in `folder`.
+
+    Args:
+        folder: of all runs.
+        scene: to run.
+        progress: opens a progress bar.
+        name: of the run; its Reynolds number, or what tells the scene, if none is given.
 
     Raises:
         TrajectoryFileError: if another scene's run is kept there in its place.
@@ -26,14 +34,14 @@ def full_run(folder: Path, scene: Scene, progress: Progress) -> Trajectory:
     """
     reynolds = scene.parameters.get("reynolds")
     short = f"{scene.name}-{digest(scene)[1:9]}" if reynolds is None else f"re-{reynolds:g}"
-    label = f"full model, {scene.name if reynolds is None else f'Re {reynolds:g}'}"
+    told = name or (scene.name if reynolds is None else f"Re {reynolds:g}")
     return kept_run(
-        folder / short / "trajectory.h5",
+        folder / (name or short).replace(" ", "_") / "trajectory.h5",
         scene,
         scene.model,
         lambda _: scene.state,
         lambda trajectory: trajectory.state(-1),
-        lambda done: progress(label, scene.steps, done),
+        lambda done: progress(f"full model, {told}", scene.steps, done),
     )
 
 

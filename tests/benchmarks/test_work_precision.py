@@ -26,8 +26,8 @@ from benchmarks.work_precision.settings import (
     varied,
 )
 from jaxsph import Trajectory, run_scene
+from jaxsph_command.commands import parser as parser_of
 from jaxsph_rom import advice
-from jaxsph_rom.cli.main import _parser as parser_of_reduced_models
 
 CASE = Case(100.0, (100.0,), 0.05, 0.0, "the exact solution")
 PACKED = FullSetting(12, start="packed")
@@ -149,7 +149,7 @@ def test_commands_of_reduced_models_are_understood():
                 continue
             words = command(name, grid.case, setting, 1e-3).split()
             assert words[0] == "jaxsph-rom"
-            options = parser_of_reduced_models().parse_args(words[1:])
+            options = parser_of("jaxsph-rom", words[1:]).parse_args(words[1:])
             assert options.modes == [setting.modes] and options.resolution == setting.resolution
             assert options.inner_product == setting.product
 

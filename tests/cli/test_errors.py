@@ -47,14 +47,16 @@ _IN_A_COMMAND = """
 import importlib
 def interrupted(*_):
     raise KeyboardInterrupt
-importlib.import_module("{module}.cli.main")._command = interrupted
+importlib.import_module("jaxsph_command.commands")._command = interrupted
 """
 
 
 @pytest.mark.parametrize("when", [_AT_START, _IN_A_COMMAND])
 @pytest.mark.parametrize("module", ["jaxsph", "jaxsph_rom"])
 def test_an_interrupt_is_one_line(module, when):
-    ending = f"import jaxsph_command, sys; sys.exit(jaxsph_command.{module}())"
+    command = "show" if module == "jaxsph" else "advise"
+    ending = f"import jaxsph_command, sys; sys.argv[1:] = ['{command}', 'x']\n"
+    ending += f"sys.exit(jaxsph_command.{module}())"
     script = when.replace("{module}", module) + ending
     done = subprocess.run(
         [sys.executable, "-c", script], env=ENVIRONMENT, capture_output=True, text=True

@@ -1,6 +1,5 @@
 """`jaxsph run my_scene.py:function --set name=value`: one's own scenes, and any setting."""
 
-import argparse
 import sys
 
 import jax
@@ -9,12 +8,12 @@ import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.cli import main
-from jaxsph.cli.run import add_to
 from jaxsph.cli.scene_functions import scene_function
 from jaxsph.cli.scene_options import scene_settings
 from jaxsph.io import read_checkpoint, read_trajectory
 from jaxsph.kernels import WendlandC4
 from jaxsph.scenes import SCENES, dam_break, taylor_green
+from jaxsph_command.commands import parser
 
 OWN = '''
 import equinox as eqx
@@ -95,13 +94,13 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, message):
 
 def settings(*arguments):
     """What is given, by the words of the scene's function."""
-    parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
-    options = parser.parse_args(["run", "dam-break", *arguments])
+    words = ["run", "dam-break", *arguments]
+    options = parser("jaxsph", words).parse_args(words)
     return scene_settings(options, scene_function("dam-break"), "float64")
 
 
 def test_any_setting_of_any_scene_can_be_given():
+    assert settings("--column", "0.1", "0.2", "--alpha", "0.3")["column"] == [0.1, 0.2]
     given = settings("--set", "tank=(0.3, 0.2)", "--set", "kernel=WendlandC4", "--set", "alpha=0")
     assert given["tank"] == (0.3, 0.2) and given["kernel"] == WendlandC4() and given["alpha"] == 0
     assert settings("--set", "wall_velocity=FreeSlip")["wall_velocity"].name == "FreeSlip"

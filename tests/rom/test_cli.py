@@ -9,7 +9,8 @@ from jaxsph_rom.cli import main
 from jaxsph_rom.cli.run import memory_length
 from tests.pages import checked_page
 
-SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice"]
+SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice",
+         "--hyper", "none"]  # fmt: skip
 KEYS = {
     "scene", "reynolds", "modes", "projection", "tau", "inner_product", "hyper", "trained_on",
     "velocity_peak_percent", "velocity_median_percent", "pressure_peak_percent",
@@ -107,7 +108,8 @@ def test_pressure_that_is_uniform_at_the_start_has_a_measure_and_a_verdict(tmp_p
 
 def test_the_papers_model_is_one_word_away(tmp_path):
     arguments = ["run", "taylor-green", "--resolution", "12", "--t-end", "0.02", "--train", "100",
-                 "--predict", "100", "--modes", "2", "--arrangement", "lattice"]  # fmt: skip
+                 "--predict", "100", "--modes", "2", "--arrangement", "lattice",
+                 "--hyper", "none"]  # fmt: skip
     choices = {}
     for name, more in (("best", []), ("paper", ["--faithful"]),
                        ("mixed", ["--faithful", "--map", "mls", "--gauge"])):  # fmt: skip

@@ -14,7 +14,6 @@ from jaxtyping import Float
 
 from jaxsph import ParticleState, Schedule, Trajectory, simulate
 from jaxsph.io import TrajectoryWriter
-from jaxsph.trajectory import Snapshot
 
 from ..prediction.prediction import Prediction
 from ..prediction.tracer_model import TracerModel, TracerState
@@ -41,10 +40,8 @@ def write_fields(
     state = ParticleState(fields.position[0], fields.velocity[0], fields.density[0])
     with _created(path, trained, prediction, member, state) as writer:
         for k, time in enumerate(fields.time):
-            snapshot = Snapshot(
-                *(getattr(fields, name)[k] for name in Snapshot.__dataclass_fields__)
-            )
-            writer.append(k * trained.schedule.steps_per_snapshot, float(time), snapshot)
+            step = k * trained.schedule.steps_per_snapshot
+            writer.append(step, float(time), fields.snapshot(k))
         if prediction.status[member] == 0:
             writer.finish()
 

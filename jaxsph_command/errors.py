@@ -3,17 +3,43 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import sys
 import warnings
+from collections.abc import Iterable
 from typing import NoReturn
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are `ValueError`s, for `report_errors` to print."""
 
+    chosen: Parser | None = None  # of the command that is named
+    subject = "the command"  # what has options, in the error for those that it has not
+
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, allow_abbrev=False, **options)
+
     def error(self, message: str) -> NoReturn:
-        raise ValueError(f"{message} (see {self.prog} --help).")
+        parser = self.chosen or self
+        unknown = message.partition("unrecognized arguments: ")[2].split()
+        if unknown:
+            flag = unknown[0].partition("=")[0]
+            near = meant(flag, parser._option_string_actions)
+            kind = "option" if flag.startswith("-") else "word"
+            message = f"{flag}: {parser.subject} has no such {kind}{near}"
+        raise ValueError(f"{message} (see {parser.prog} --help).")
+
+    def _check_value(self, action, value):
+        if action.choices is not None and value not in action.choices:
+            text = f"invalid choice: {value!r}{meant(str(value), action.choices)}, choose from "
+            raise argparse.ArgumentError(action, text + ", ".join(map(repr, action.choices)))
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """` (did you mean X?)` where something known is near."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 def report_errors(program: str, command, *arguments) -> int:

@@ -1,0 +1,74 @@
+"""Both programs' commands; the one that is named is imported, the others are only told of."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import import_module
+
+from .config import add_config_option, expanded, typed
+from .errors import Parser, report_errors
+
+# command: what it does in a line, and the module that adds its options
+COMMANDS = {
+    "jaxsph": {
+        "scenes": ("list the scenes, or tell what one can be given", "jaxsph_command.scenes"),
+        "run": ("run a full model", "jaxsph.cli.run"),
+        "sweep": ("run a scene at many Reynolds numbers and seeds", "jaxsph.cli.sweep"),
+        "show": ("a quick look at a run, or at any other file of this project", "jaxsph.cli.show"),
+        "export": ("write a run for ParaView", "jaxsph.cli.export"),
+        "animate": ("draw a run as a moving picture", "jaxsph.cli.animate"),
+    },
+    "jaxsph-rom": {
+        "run": ("train, predict, compare with the full model", "jaxsph_rom.cli.run"),
+        "train": ("make a reduced model on reference points, as a file", "jaxsph_rom.cli.train"),
+        "predict": (
+            "run the file of a reduced model at any parameters",
+            "jaxsph_rom.cli.predict",
+        ),
+        "suggest": (
+            "where a reduced model needs its next training run",
+            "jaxsph_rom.cli.suggest",
+        ),
+        "advise": ("which setting to use for a wanted accuracy or time", "jaxsph_rom.cli.advise"),
+    },
+}
+_ABOUT = {
+    "jaxsph": "Differentiable smoothed-particle hydrodynamics.",
+    "jaxsph-rom": "Projection-based reduced models of SPH flows.",
+}
+
+
+def main(program: str, argv: list[str] | None = None) -> int:
+    """A program. Exit code 0: good, 1: a fault in mid-run, 2: bad input."""
+    return report_errors(program, _command, program, argv)
+
+
+def parser(program: str, words: list[str], every: bool = False) -> Parser:
+    """A program's parser, with the options of the command that the words name, or of every one."""
+    top = Parser(program, description=_ABOUT[program])
+    top.add_argument("--version", action=_Version, nargs=0, help="show the version")
+    commands = top.add_subparsers(metavar="COMMAND", required=True)
+    for name, (told, module) in COMMANDS[program].items():
+        command = commands.add_parser(name, help=told)
+        if every or words[:1] == [name]:
+            import_module(module).add_to(command, [] if every else words[1:])
+            add_config_option(command)
+            top.chosen = command
+    return top
+
+
+def _command(program: str, argv: list[str] | None) -> int:
+    words = expanded(sys.argv[1:] if argv is None else list(argv))
+    options = parser(program, words).parse_args(words)
+    options.program, options.name = program, words[0]
+    options.typed = typed(parser(program, words).chosen, words[1:])
+    return options.command(options)
+
+
+class _Version(argparse.Action):
+    """Looks the version up when it is asked for."""
+
+    def __call__(self, parser, *_):
+        print(f"{parser.prog} {import_module('jaxsph.version').__version__}")
+        parser.exit()
