@@ -36,7 +36,7 @@ def test_show(tmp_path, capsys):
     assert main(["show", "t.h5", "--json", "new/t.json"]) == 0
     rows = shown(capsys)
     assert rows["file"].startswith("t.h5, ") and rows["scene"] == "taylor-green"
-    assert "PressureForce" in rows["effects"] and rows["reynolds"] == "100"
+    assert "AdjointPressure" in rows["effects"] and rows["reynolds"] == "100"
     assert rows["particles"] == "256, in 2 dimensions, float64"
     assert rows["progress"].startswith("complete, ") and rows["run"] == "1.5 s"
     assert rows["time"] == f"5 snapshots from 0 to {run.time[-1]:g} s"
