@@ -153,7 +153,7 @@ def test_bad_model_files_are_one_line_and_code_2(folder, tmp_path, capsys):
     [
         (["train", "no-such-scene"], "no-such-scene"),
         (["train", "couette"], "--train"),
-        (["train", "dam-break", "--train", "100"], "no Reynolds number"),
+        (["train", "dam-break", "--train", "100"], "scene dam-break has no reynolds"),
         (["train", "poiseuille", "--train", "10", "20", "40", "--resolution", "10"], "box"),
         (["train", "open-cavity", "--resolution", "32", "--settling", "0.01"], "KickAndHold"),
         ([*TRAIN, "--modes", "500"], "500 asked for"),
