@@ -15,7 +15,8 @@ import pytest
 import jaxsph
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("jaxsph", "jaxsph_rom", "jaxsph_command", "benchmarks", "docs", "notebooks", "tests", ".ci")
+PACKAGES = ("jaxsph", "jaxsph_rom", "jaxsph_command")
+FOLDERS = (*PACKAGES, "benchmarks", "docs", "notebooks", "tests", ".ci")
 MAIN_JOB = (
     "run taylor-green --resolution 16 --t-end 0.06 --arrangement lattice "
     "--train 100 200 --predict 150 --modes 2 --out out"
@@ -61,12 +62,12 @@ def test_the_wheel_holds_the_packages_and_their_data(built):
     data = {"jaxsph/py.typed", "jaxsph_rom/py.typed", "jaxsph_rom/advice/work_precision.json"}
     modules = {
         path.relative_to(ROOT).as_posix()
-        for top in ("jaxsph", "jaxsph_rom", "jaxsph_command")
+        for top in PACKAGES
         for path in (ROOT / top).rglob("*.py")
     }
     assert names >= data | modules
     metadata = f"jaxsph-{jaxsph.__version__}.dist-info"
-    tops = {"jaxsph", "jaxsph_rom", "jaxsph_command", metadata}
+    tops = {*PACKAGES, metadata}
     assert {name.partition("/")[0] for name in names} == tops
     assert f"{metadata}/licenses/LICENSE" in names
 
