@@ -14,6 +14,7 @@ from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.effects import Continuity, LaminarViscosity, PressureForce
 from jaxsph.integrate import Fault, FaultCode, Model, integrate
 from jaxsph.scenes import taylor_green
+from jaxsph.schemes import DeltaPlus
 
 NEVER = 1e9
 
@@ -290,7 +291,7 @@ def test_no_steps_raise(steps):
 @pytest.fixture(scope="module")
 def vortices():
     """With three effects only: derivatives of all sums are tested with the pair sum."""
-    scene = taylor_green(12, arrangement=JitteredLattice(0.1))
+    scene = taylor_green(12, arrangement=JitteredLattice(0.1), scheme=DeltaPlus())
     kinds = Continuity | PressureForce | LaminarViscosity
     kept = tuple(e for e in scene.effects if isinstance(e, kinds))
     return eqx.tree_at(lambda s: s.effects, scene, kept)

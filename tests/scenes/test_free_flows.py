@@ -36,6 +36,7 @@ from jaxsph.scenes.rotating_square_patch import patch_pressure
 from jaxsph.scenes.standing_wave import FREQUENCY
 
 SMALL = {
+    "channel-cylinder": 41,
     "couette": 25,
     "poiseuille": 25,
     "dam-break": 50,
