@@ -17,11 +17,14 @@ from .effects.local_no_slip import NearWeight
 from .full_model import FullModel
 from .pairs import PairTerm
 from .particles import ParticleState
+from .shown import concrete
 from .wall_sums import wall_sums
 from .wall_surface import Loads, WallSurface, reaction
 from .walls.parts import WHOLE
 from .walls.surface import surface
 from .walls.walls import distances
+
+_ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
 
 
 class WallForces(eqx.Module):
@@ -95,19 +98,34 @@ class WallForces(eqx.Module):
         """Forces (n,) [N] of the fluid on each part, and torques about the origin [N m], scalars in
         two dimensions, by name; of a metre's depth in two dimensions.
 
+        A neighbour list without room is allocated anew. Inside another program, which cannot be
+        compiled anew, forces are NaN then.
+
         Args:
             model: of the scene.
             time: [s].
             state: the particles then.
+
+        Raises:
+            ValueError: if a list four times as large does not hold all pairs.
         """
-        loads = _measured(self, model, time, state)
-        return tuple(dict(zip(self.names, value, strict=True)) for value in loads)
+        if concrete(*jax.tree.leaves(eqx.filter((model, time, state), eqx.is_array))):
+            found = _whole(self, model, time, state)
+        else:  # in another program, which has compiler options of its own
+            found = loads(self, model, time, state)
+        return tuple(dict(zip(self.names, value, strict=True)) for value in found)
 
 
 def loads(
     forces: WallForces, model: FullModel, time: Float[Array, ""], state: ParticleState
 ) -> Loads:
-    """Forces (K, n) and torques on all parts; pure, so differentiate and map it."""
+    """Forces (K, n) and torques on all parts; pure, so differentiate and map it. NaN where the
+    neighbour list does not hold all pairs."""
+    return _guarded(forces, model, time, state)[0]
+
+
+def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
+    """The loads, and whether the neighbour list overflowed."""
     neighbors = model.at(time).prepare(state)
     functional = model.functional
     context, fields, ghosts, terms, sums = functional.passes(time, state, neighbors)
@@ -131,10 +149,23 @@ def loads(
     seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares)
     found = [reaction(position, given)]
     found += [effect.on_walls(context, fields, seen) for effect in functional.effects]
-    return jax.tree.map(lambda *a: sum(a[1:], a[0]), *(each for each in found if each is not None))
+    found = [each for each in found if each is not None]
+    whole = jax.tree.map(lambda *a: sum(a[1:], a[0]), *found)
+    kept = jax.tree.map(lambda a: jnp.where(neighbors.overflow, jnp.nan, a), whole)
+    return kept, neighbors.overflow
 
 
-_measured = eqx.filter_jit(loads, compiler_options=COMPILER_OPTIONS)
+_measured = eqx.filter_jit(_guarded, compiler_options=COMPILER_OPTIONS)
+
+
+def _whole(forces: WallForces, model: FullModel, time, state) -> Loads:
+    """The loads by a list that holds all pairs: the run has not built it, nobody else will see."""
+    for _ in range(_ENLARGEMENTS + 1):
+        found, overflow = _measured(forces, model, time, state)
+        if not overflow:
+            return found
+        model = model.enlarged()
+    raise ValueError("state: particles clump, far more beside each other than at rest.")
 
 
 def _nearness(space) -> NearWeight:

@@ -170,6 +170,20 @@ def test_forces_are_differentiable(scheme):
         assert float(jax.grad(drag)(START)) == pytest.approx(slope, rel=1e-9)
 
 
+def test_a_list_without_room_is_made_anew_or_the_force_is_none():
+    scene = vessel(DeltaPlus())
+    state, model, measure = stirred(scene), scene.model(margin=2.0), WallForces.of(scene)
+    need = int(model.search.build(state.position).fluid.largest_count)
+    fluid = dataclasses.replace(model.search.fluid, capacity=need - 1)
+    short = dataclasses.replace(model, search=dataclasses.replace(model.search, fluid=fluid))
+    expected, _ = measure(model, START, state)
+    found, _ = measure(short, START, state)
+    for name in expected:
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-9)
+    traced = jax.jit(lambda x: measure(short, START, x)[0]["walls"])(state)
+    assert np.isnan(traced).all()
+
+
 def test_loop_is_the_same_with_and_without_named_parts():
     """Forces are measured at snapshots by a program of their own."""
     named = conserving(vessel(DeltaPlus()))

@@ -178,7 +178,8 @@ def _reduced_command(name, case: Case, setting: ReducedSetting, time_step: float
         return "benchmarks.work_precision.reduced.sampled (jaxsph_rom.points.SampledRates)"
     quietly = setting.start == "quiet"
     parts = [
-        f"jaxsph-rom run {name} --train {' '.join(f'{re:g}' for re in case.trained_on)} "
+        f"jaxsph-rom run {name} --scheme {setting.training.scheme} "
+        f"--train {' '.join(f'{re:g}' for re in case.trained_on)} "
         f"--predict {case.reynolds:g} --modes {setting.modes}",
         _sizes(setting, case, time_step),
         f"--inner-product {setting.product}",
