@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -114,8 +115,9 @@ class NeighborSearch(eqx.Module):
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         return neighbors.largest_motion(self.box, position)
 
+    @partial(eqx.filter_jit, inline=True)
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
-        """The list of all neighbours within support + skin of each particle, inside jit."""
+        """The list of all neighbours within support + skin of each particle, in jit or out of it."""
         position = lax.stop_gradient(position)
         points, words, largest = self._flag(position)
         longest = longest_run(self.grid, points, points)

@@ -203,6 +203,7 @@ class WalledSearch(eqx.Module):
         ghost_way = jnp.sqrt(jnp.max(jnp.sum(ghost_way * ghost_way, axis=1)))
         return jnp.maximum(way, ghost_way), jnp.where(way >= ghost_way, particle, -1)
 
+    @partial(eqx.filter_jit, inline=True)
     def build(self, position: Float[Array, "particles dim"]) -> WallList:
         """All pairs within support + skin, of two particles or of a particle and a ghost."""
         position = lax.stop_gradient(position)
