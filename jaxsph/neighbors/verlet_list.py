@@ -115,21 +115,9 @@ class NeighborSearch(eqx.Module):
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         return neighbors.largest_motion(self.box, position)
 
-    @partial(eqx.filter_jit, inline=True)
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
-        """The list of all neighbours within support + skin of each particle, in jit or out of it."""
-        position = lax.stop_gradient(position)
-        points, words, largest = self._flag(position)
-        longest = longest_run(self.grid, points, points)
-        places = jnp.arange(points.count, dtype=jnp.int32)
-        return VerletList(
-            index=pick(words, self.grid, points, points, self.run_capacity, self.capacity),
-            order=points.order,
-            inverse=jnp.zeros_like(places).at[points.order].set(places, unique_indices=True),
-            reference=position,
-            largest_count=largest,
-            cell_overflow=(longest > self.run_capacity).astype(jnp.int32),
-        )
+        """The list of all neighbours within support + skin of each, in jit or out of it."""
+        return _built(self, position)
 
     def _flag(self, position):
         """Sorted points, a bit for each candidate of each: neighbour or not; and their most."""
@@ -148,6 +136,22 @@ def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
                 f"{support:g} m (with skin {radius:g} m); it needs at least {2 * radius:g} m. "
                 "Raise the resolution or lower h/dx."
             )
+
+
+@partial(eqx.filter_jit, inline=True)  # one program, where a caller has none of its own
+def _built(search: NeighborSearch, position) -> VerletList:
+    position = lax.stop_gradient(position)
+    points, words, largest = search._flag(position)
+    longest = longest_run(search.grid, points, points)
+    places = jnp.arange(points.count, dtype=jnp.int32)
+    return VerletList(
+        index=pick(words, search.grid, points, points, search.run_capacity, search.capacity),
+        order=points.order,
+        inverse=jnp.zeros_like(places).at[points.order].set(places, unique_indices=True),
+        reference=position,
+        largest_count=largest,
+        cell_overflow=(longest > search.run_capacity).astype(jnp.int32),
+    )
 
 
 @eqx.filter_jit  # compiled once for scenes alike

@@ -203,20 +203,9 @@ class WalledSearch(eqx.Module):
         ghost_way = jnp.sqrt(jnp.max(jnp.sum(ghost_way * ghost_way, axis=1)))
         return jnp.maximum(way, ghost_way), jnp.where(way >= ghost_way, particle, -1)
 
-    @partial(eqx.filter_jit, inline=True)
     def build(self, position: Float[Array, "particles dim"]) -> WallList:
         """All pairs within support + skin, of two particles or of a particle and a ghost."""
-        position = lax.stop_gradient(position)
-        fluid = self.fluid.build(position)
-        here, ghosts, (seen, seeing), (overflow, _) = self._flag(fluid.sort(position))
-        grid, near, count = self.wall_grid, here.order, here.count
-        to_ghosts, to_fluid = self.ghost_run_capacity, self.near_run_capacity
-        index = jnp.concatenate([
-            pick(seen, grid, here, ghosts, to_ghosts, self.capacity, entry=count),
-            pick(seeing, grid, ghosts, here, to_fluid, self.capacity, own=count),
-        ])  # fmt: skip
-        built_at = self.ghosts if self.within_reach is None else None
-        return WallList(fluid, WallPairs(index, near, ghosts.order), overflow, built_at)
+        return _built(self, position)
 
     @partial(eqx.filter_jit, inline=True)
     def _may_see(self, position) -> Bool[Array, " points"]:
@@ -276,6 +265,21 @@ def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     safe = np.where(closed, 1.0, lengths)
     wrapped = np.where(closed, points, np.mod(points, safe))
     return np.where(~closed & (wrapped >= safe), 0.0, wrapped)  # mod may round up to the length
+
+
+@partial(eqx.filter_jit, inline=True)
+def _built(search: WalledSearch, position) -> WallList:
+    position = lax.stop_gradient(position)
+    fluid = search.fluid.build(position)
+    here, ghosts, (seen, seeing), (overflow, _) = search._flag(fluid.sort(position))
+    grid, near, count = search.wall_grid, here.order, here.count
+    to_ghosts, to_fluid = search.ghost_run_capacity, search.near_run_capacity
+    index = jnp.concatenate([
+        pick(seen, grid, here, ghosts, to_ghosts, search.capacity, entry=count),
+        pick(seeing, grid, ghosts, here, to_fluid, search.capacity, own=count),
+    ])  # fmt: skip
+    built_at = search.ghosts if search.within_reach is None else None
+    return WallList(fluid, WallPairs(index, near, ghosts.order), overflow, built_at)
 
 
 @eqx.filter_jit  # compiled once for scenes alike
