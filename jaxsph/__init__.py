@@ -49,7 +49,11 @@ from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
 from .walls import MovingBody as MovingBody
 from .walls import MovingWall as MovingWall
+from .walls import Outline as Outline
 from .walls import Region as Region
+from .walls import SampledDistance as SampledDistance
 from .walls import SignedDistance as SignedDistance
 from .walls import WallPart as WallPart
 from .walls import Walls as Walls
+from .walls import outline_from_file as outline_from_file
+from .walls import solid_from_file as solid_from_file

@@ -26,7 +26,7 @@ def shown():
 def test_a_scene_takes_ten_lines():
     made = [node for block in BLOCKS for node in ast.parse(block).body
             if isinstance(node, ast.FunctionDef)]  # fmt: skip
-    assert [node.name for node in made] == ["channel", "swirl"]
+    assert [node.name for node in made] == ["channel", "swirl", "tunnel"]
     assert all(node.end_lineno - node.lineno + 1 <= 10 for node in made)
 
 
@@ -44,3 +44,9 @@ def test_the_command_line_runs_it(tmp_path, monkeypatch):
     assert main(["run", "my_scene.py:channel", "--set", "force=0.3"]) == 0
     found = read_trajectory(tmp_path / "out" / "channel" / "trajectory.h5")
     assert found.metadata["parameters"]["force"] == 0.3
+
+
+def test_a_drawn_body_is_dragged_along_and_not_to_a_side(shown):
+    force = run_scene(shown["tunnel"]()).forces["ellipse"]
+    assert (force[1:, 0] > 0.03).all()  # a body force of 0.5 m/s^2 has just set the fluid going
+    np.testing.assert_allclose(force[:, 1], 0.0, atol=1e-10)

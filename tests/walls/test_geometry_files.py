@@ -1,0 +1,120 @@
+"""Bodies from files."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import trimesh
+
+from jaxsph import (
+    BallRegion,
+    Box,
+    BoxRegion,
+    Outline,
+    SampledDistance,
+    Space,
+    Walls,
+    outline_from_file,
+    solid_from_file,
+)
+from jaxsph.kernels import WendlandC2
+
+SQUARE = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]
+
+
+def test_a_table_is_read_scaled_and_moved(tmp_path):
+    path = tmp_path / "box.dat"
+    path.write_text("NAME 12\n" + "\n".join(f"{x} {y}" for x, y in SQUARE) + "\n\n")
+    found = outline_from_file(path, scale=0.5, offset=(1.0, 0.0))
+    assert found == Outline([[(1.0, 0.0), (2.0, 0.0), (2.0, 0.5), (1.0, 0.5)]])
+    path.write_text("x,y\n" + "\n".join(f"{x},{y}" for x, y in SQUARE)
+                    + "\n\n0.5,0.25\n1.0,0.25\n1.0,0.75\n")  # fmt: skip
+    assert len(outline_from_file(path).rings) == 2
+
+
+def test_drawings_are_read(tmp_path):
+    path = tmp_path / "box.svg"
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 4 4">'
+        '<path d="M 0 0 L 2 0 L 2 1 L 0 1 Z"/></svg>'
+    )
+    square = outline_from_file(path)
+    points = jnp.asarray(np.random.default_rng(0).uniform(-1.0, 3.0, (50, 2)))
+    expected = Outline([SQUARE]).signed_distance(points)
+    np.testing.assert_allclose(square.signed_distance(points), expected, atol=1e-9)
+    drawn = trimesh.path.creation.circle(radius=0.5)
+    drawn.export(str(tmp_path / "disc.dxf"))
+    disc = outline_from_file(tmp_path / "disc.dxf").signed_distance(points)
+    exact = BallRegion((0.0, 0.0), 0.5).signed_distance(points)
+    np.testing.assert_allclose(disc, exact, atol=0.02 * 0.5)  # by how finely it draws arcs
+
+
+def test_a_ball_s_surface_is_that_of_the_ball(tmp_path):
+    path, radius, spacing = tmp_path / "ball.stl", 0.5, 0.05
+    trimesh.creation.icosphere(subdivisions=4, radius=1e3 * radius).export(str(path))
+    ball = solid_from_file(path, spacing, scale=1e-3, offset=(1.0, 1.0, 1.0))
+    exact = BallRegion((1.0, 1.0, 1.0), radius)
+    rng = np.random.default_rng(0)
+    way = rng.normal(size=(500, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    near = jnp.asarray(1.0 + way * (radius + rng.uniform(-0.1, 0.1, (500, 1))))
+    found, expected = ball.signed_distance(near), exact.signed_distance(near)
+    # of the grid n delta^2 / (8 R) at R = 0.4, and the triangles' own
+    assert float(jnp.abs(found - expected).max()) < 3 * spacing**2 / (8 * 0.4) + 1e-3 * radius
+    far = jnp.asarray(rng.uniform(-2.0, 4.0, (200, 3)))
+    assert bool((jnp.sign(ball.signed_distance(far)) == jnp.sign(exact.signed_distance(far))).all())
+    again = solid_from_file(path, spacing, scale=1e-3, offset=(1.0, 1.0, 1.0))
+    assert again == ball and hash(again) == hash(ball)
+    assert ball != solid_from_file(path, 0.06, scale=1e-3, offset=(1.0, 1.0, 1.0))
+
+
+def test_walls_stand_around_a_body_from_a_file(tmp_path):
+    path = tmp_path / "ball.ply"
+    trimesh.creation.icosphere(subdivisions=3, radius=0.5).export(str(path))
+    ball = solid_from_file(path, 0.05, offset=(1.0, 1.0, 1.0))
+    space = Space(Box((0.0,) * 3, (2.0,) * 3, (True,) * 3), WendlandC2(), 0.15, 0.1)
+    everywhere = BoxRegion((-np.inf,) * 3, (np.inf,) * 3)
+    found = Walls.around(everywhere & ~ball, space)
+    exact = Walls.around(everywhere & ~BallRegion((1.0,) * 3, 0.5), space)
+    assert abs(len(found.position) - len(exact.position)) < 0.1 * len(exact.position)
+    outward = np.asarray(found.position) - 1.0
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    surface = np.linalg.norm(np.asarray(found.position) - 1.0, axis=1) > 0.3
+    assert ((outward * np.asarray(found.normal)).sum(axis=1)[surface] > 0.97).all()
+
+
+def test_what_is_no_body_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no such file"):
+        outline_from_file(tmp_path / "none.dat")
+    path = tmp_path / "text.dat"
+    path.write_text("nothing here\n")
+    with pytest.raises(ValueError, match="two columns"):
+        outline_from_file(path)
+    path = tmp_path / "open.svg"
+    path.write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0 0 L 2 0 L 2 1"/></svg>')
+    with pytest.raises(ValueError, match="no closed outline"):
+        outline_from_file(path)
+    mesh = trimesh.creation.box()
+    mesh.update_faces(np.arange(len(mesh.faces)) > 1)
+    mesh.export(str(tmp_path / "open.stl"))
+    with pytest.raises(ValueError, match="not closed"):
+        solid_from_file(tmp_path / "open.stl", 0.1)
+    (tmp_path / "bad.stl").write_text("no surface")
+    with pytest.raises(ValueError, match="bad.stl"):
+        solid_from_file(tmp_path / "bad.stl", 0.1)
+    with pytest.raises(ValueError, match="spacing: must be positive"):
+        solid_from_file(tmp_path / "open.stl", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.ones((4, 4)), "negative in the region"),
+        (np.full((4, 4), np.nan), "finite"),
+        (np.ones((4, 4, 4)), "for 2 dimensions"),
+        (np.where(np.arange(4) < 1, -1.0, 1.0)[:, None] + np.zeros((4, 4)), "grid's edge"),
+    ],
+    ids=["no region", "not finite", "in space", "cut off"],
+)
+def test_samples_that_hold_no_region_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        SampledDistance((0.0, 0.0), 0.1, values)
