@@ -109,6 +109,20 @@ def write_json(path: Path | None, results: dict[str, Any]) -> None:
         path.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
 
 
+def bytes_in(folder: Path) -> int:
+    """Of all files in a folder and below it."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def bytes_told(count: int) -> str:
+    """Bytes as people read them."""
+    value, units = float(count), ["B", "kB", "MB", "GB", "TB"]
+    while value >= 1000.0 and len(units) > 1:
+        value /= 1000.0
+        units.pop(0)
+    return f"{value:.3g} {units[0]}"
+
+
 def print_rows(rows: dict[str, str]) -> None:
     """Names and values, aligned."""
     for name, value in rows.items():

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
 from pathlib import Path
 
 import jax
 
 from jaxsph.cli import Parser, fail, positive_float, positive_int
+from jaxsph.cli.options import bytes_in, bytes_told
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
@@ -26,10 +28,12 @@ from ..projection import (
     MemoryLength,
     SpectralMemory,
 )
-from ..report import format_table
+from ..report import Case, best, format_table, verdict
+from ..report.table import WIDTH
 from ..splines import LocalSplines
 from ..still_walls import check_still
 from ..study import PLANS, OnParticles, OnPoints, Plan, Study, write_study
+from ..study.write import MODEL
 from .options import (
     PRODUCTS,
     add_closure_options,
@@ -153,8 +157,29 @@ def _run(options) -> int:
     print(format_table([outcome.case for outcome in outcomes]))
     if plan.judged_from:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
+    _print_verdict([outcome.case for outcome in outcomes], folder, plan)
     print(f"\nreport: {folder / 'report.html'}, {report}\nfigures: {folder}/*.png")
+    _print_disk(folder)
     return 0
+
+
+def _print_verdict(cases: list[Case], folder: Path, plan: Plan) -> None:
+    """What the table comes to, and how to use the model that it speaks for."""
+    for text in verdict(cases):
+        print("\n" + textwrap.fill(text, WIDTH))
+    if (folder / MODEL).exists():
+        told = best([case for case in cases if case.hyper != "none"])[0]
+        print(f"\n{folder / MODEL} is the model on points with M = {told.modes}; run it by\n"
+              f"  jaxsph-rom predict {folder / MODEL} --reynolds {plan.predict[0]:g}")  # fmt: skip
+    elif not any(case.time_ratio is not None and case.time_ratio > 1.0 for case in cases):
+        print("\nModels on points are the fast ones: add --hyper tensor.")
+
+
+def _print_disk(folder: Path) -> None:
+    """What the folder takes, and what of it only spares running again."""
+    kept = [bytes_in(folder / name) for name in ("full", "reduced")]
+    print(f"disk: {bytes_told(bytes_in(folder))} in {folder}, {bytes_told(sum(kept))} of it runs "
+          "that are kept: the same command goes on from them")  # fmt: skip
 
 
 def _plan(options) -> Plan:

@@ -12,7 +12,7 @@ import jax
 
 from jaxsph import Trajectory
 from jaxsph.cli import Parser, fail, positive_int, print_rows
-from jaxsph.cli.options import result_file
+from jaxsph.cli.options import bytes_in, bytes_told, result_file
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
@@ -123,7 +123,7 @@ def _train(options) -> int:
         options.json.parent.mkdir(parents=True, exist_ok=True)
         results = plain(_results(trained, path))
         options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
-    _print(trained, runs[0].particles, path)
+    _print(trained, runs[0].particles, path, folder)
     return 0
 
 
@@ -176,7 +176,7 @@ def _results(trained: TrainedModel, path: Path) -> dict[str, Any]:
     }
 
 
-def _print(trained: TrainedModel, particles: int, path: Path) -> None:
+def _print(trained: TrainedModel, particles: int, path: Path, folder: Path) -> None:
     made = trained.training
     closure = made["closure"]
     if closure != "none":
@@ -191,7 +191,8 @@ def _print(trained: TrainedModel, particles: int, path: Path) -> None:
         "full runs": f"{made['full_seconds']:.3g} s",
         "offline": f"{made['offline_seconds']:.3g} s (map, decompose, project)",
         "closure": closure,
-        "model": str(path),
+        "model": f"{path}, {bytes_told(path.stat().st_size)}",
+        "runs kept": f"{bytes_told(bytes_in(folder / 'full'))} in {folder / 'full'}",
     })  # fmt: skip
     print_errors(made)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from ..report import (
     Case,
     Profile,
     Shown,
+    best,
     centre_line_profiles,
     discrepancy_history,
     field_snapshots,
@@ -27,9 +29,14 @@ from .full_runs import FullRuns
 from .method import Experiment, ModelBasis
 from .study import Outcome, Study
 
+MODEL = "model.h5"  # the file of a model on points, beside the report
 _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
 _SETTINGS = ("advection", "map", "interpolation", "spline_order", "judged_from")
+_WRITTEN = (
+    "singular_values*.png", "modes*.png", "fields_re_*.png", "discrepancy.png", "centre_line.png",
+    MODEL,
+)  # fmt: skip
 _LISTED_MODES = (2, 5, 10, 20, 30)
 
 
@@ -41,7 +48,10 @@ def write_study(
     json_path: Path | None = None,
     profile_time: float | None = None,
 ) -> dict[str, Any]:
-    """Write the figures of a study, `report.json` and `report.html` into a folder.
+    """Write the figures of a study, `report.json`, `report.html` and `model.h5` into a folder.
+
+    The model is that on reference points which errs least, if there is one. Figures and a model of
+    an earlier study in the folder are removed.
 
     Args:
         study: made the runs.
@@ -57,6 +67,9 @@ def write_study(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    for pattern in _WRITTEN:
+        for earlier in folder.glob(pattern):
+            earlier.unlink()
     bases: list[dict[str, Any]] = []
     basis_figures: list[Shown] = []
     shown_of = [outcome for e in experiments for outcome in _largest(e, outcomes)]
@@ -93,6 +106,12 @@ def write_study(
     told = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
     told.pop("reynolds", None)  # each case has its own
     write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on)
+    on_points = [outcome for outcome in outcomes if outcome.model is not None]
+    if on_points:
+        chosen = best([outcome.case for outcome in on_points])[0]
+        model = next(o.model for o in on_points if o.case is chosen)
+        made = model.training | {"inner_product": chosen.inner_product}
+        dataclasses.replace(model, training=made).save(folder / MODEL)
     return extra
 
 
