@@ -16,7 +16,7 @@ from jaxsph_command.errors import Parser
 from ..integrate import explanation
 from ..io import check_target
 from ..progress import progress_bar
-from ..sweeps import sweep
+from ..sweeps import sweep, sweep_file
 from .options import positive_int, print_rows, result_file, reynolds_numbers, write_json
 from .scene_functions import made, name_of, scene_function
 from .scene_options import add_scene_options, scene_settings
@@ -60,8 +60,9 @@ def _sweep(options) -> int:
             member = argparse.Namespace(**{**vars(options), "reynolds": reynolds, "seed": number})
             scenes.append(made(make, scene_settings(member, make, precision)))
         before = clock.perf_counter()
+        sweep_file.create(path, scenes)  # meets a file of something else
+        write_config(path.with_name(NAME), options)
         with progress_bar(len(scenes), "run") as bar:
-            write_config(path.with_name(NAME), options)
             status = sweep(scenes, path, batch=options.batch, progress=bar.update)
     lost = np.flatnonzero(status.code)
     for number in lost[:_FAULTS_SHOWN]:

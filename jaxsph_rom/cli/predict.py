@@ -112,9 +112,11 @@ def _times(options, trained: TrainedModel) -> np.ndarray | None:
     nearest = count * trained.schedule.interval
     if abs(nearest - options.t_end) > 1e-6 * nearest:
         raise ValueError(
-            f"t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
+            f"--t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
             f"{trained.schedule.interval:g} s; the nearest is {nearest:g} s."
         )
+    if count * trained.flow.basis.size * 8 > _MOST_BYTES:
+        raise ValueError(f"--t-end: {count} snapshots are too many to keep; give an earlier end.")
     return trained.schedule.interval * np.arange(count + 1)
 
 
