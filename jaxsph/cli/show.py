@@ -13,7 +13,7 @@ from ..io import Overview, check_target, read_overview, read_snapshot, read_wall
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
-from .options import bytes_told, print_rows, write_json
+from .options import add_json_option, bytes_told, print_rows, write_json
 from .show_contents import contents, file_format
 from .show_other import other_contents
 
@@ -31,13 +31,12 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, or another file")
     add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
-    add("--json", type=Path, metavar="FILE", help="write what is shown to FILE as well")
+    add_json_option(parser)
 
 
 def _show(options) -> int:
-    for target in (options.figure, options.json):
-        if target is not None:
-            check_target(target)
+    if options.figure is not None:
+        check_target(options.figure)
     rows = _contents(options.file)
     if rows is not None:
         if options.figure is not None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
 import textwrap
 from pathlib import Path
 
 import jax
 
 from jaxsph.cli import Parser, fail, positive_float, positive_int
-from jaxsph.cli.options import bytes_in, bytes_told
+from jaxsph.cli.options import add_json_option, bytes_in, bytes_told, write_json
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
@@ -113,7 +114,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
         "0.25)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
-    add("--json", type=Path, metavar="FILE", help="write the report there, not to DIR/report.json")
+    add_json_option(parser)
 
 
 def memory_length(text: str) -> float | MemoryLength:
@@ -130,9 +131,8 @@ def memory_length(text: str) -> float | MemoryLength:
 
 def _run(options) -> int:
     folder = options.out or Path("out", f"rom-{name_of(options.scene, options.make)}")
-    report = folder / "report.json" if options.json is None else options.json
+    report = folder / "report.json"
     check_target(report)
-    check_target(folder / "report.json")
     check_target(folder / "report.html")
     for name, value in (PAPERS if options.faithful else BEST).items():
         if getattr(options, name) is None:
@@ -153,7 +153,9 @@ def _run(options) -> int:
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
         write_config(folder / NAME, options)
-        write_study(study, experiments, outcomes, folder, report)
+        write_study(study, experiments, outcomes, folder)
+    if options.json is not None:
+        write_json(options.json, json.loads(report.read_text()))
     print(format_table([outcome.case for outcome in outcomes]))
     if plan.judged_from:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")

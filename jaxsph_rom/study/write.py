@@ -22,6 +22,7 @@ from ..report import (
     field_snapshots,
     modes,
     singular_values,
+    verdict,
     write_html_report,
     write_report,
 )
@@ -45,7 +46,6 @@ def write_study(
     experiments: Sequence[Experiment],
     outcomes: Sequence[Outcome],
     folder: Path,
-    json_path: Path | None = None,
     profile_time: float | None = None,
 ) -> dict[str, Any]:
     """Write the figures of a study, `report.json`, `report.html` and `model.h5` into a folder.
@@ -58,8 +58,7 @@ def write_study(
         experiments: each with a basis of its own; the figures of bases are numbered if there are
             several.
         outcomes: of all experiments.
-        folder: where figures and `report.html` go, and `report.json` unless `json_path` is given.
-        json_path: where `report.json` goes.
+        folder: where all of them go.
         profile_time: at which profiles and fields are shown [s]; half the run if none is given.
 
     Returns:
@@ -88,6 +87,7 @@ def write_study(
         "parameters": first.parameters,
         "map": ", ".join(dict.fromkeys(basis["map"] for basis in bases)),
         "judged_from": study.judged_from,
+        "verdict": verdict([outcome.case for outcome in outcomes]),
         **settings,
     }
     history = discrepancy_history(
@@ -102,7 +102,7 @@ def write_study(
     if first.space.box.dim == 2:
         shown += _fields(study.runs, outcomes, folder, profile_time)
     cases, made_on = [outcome.case for outcome in outcomes], environment()
-    write_report(json_path or folder / "report.json", cases, made_on, extra)
+    write_report(folder / "report.json", cases, made_on, extra)
     told = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
     told.pop("reynolds", None)  # each case has its own
     write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on)

@@ -119,6 +119,10 @@ FULL = {
     "sweep taylor-green --reynolds 100 --batch 0": "--batch: must be at least 1",
     "sweep dam-break --reynolds 100": "--reynolds: scene dam-break",
     "sweep taylor-green --reynolds 100 --resolution 16 --arrangement lattice --out t.h5": "t.h5",
+    # completion
+    "completion": "SHELL",
+    "completion zhs": "invalid choice: 'zhs' (did you mean zsh?)",
+    "completion bash zsh": "zsh: the command has no such word",
     # show, export, animate
     "show": "FILE",
     "show missing.h5": "no such file",
@@ -189,6 +193,10 @@ REDUCED = {
     "suggest missing.h5": "cannot be read",
     "suggest t.h5": "holds no reduced",
     "suggest model.h5 --json text/s.json": "Not a directory",
+    # completion
+    "completion": "SHELL",
+    "completion zhs": "invalid choice: 'zhs' (did you mean zsh?)",
+    "completion bash zsh": "zsh: the command has no such word",
     # advise
     "advise": "SCENE",
     "advise taylor-green": "give --velocity-error",
