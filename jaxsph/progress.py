@@ -10,6 +10,7 @@ from typing import final
 from tqdm import tqdm
 
 COMPILING = "compiling"
+_AT_FIRST = 1e-3  # seconds in which bad input is met, so that its line stands alone
 
 
 @final
@@ -21,14 +22,20 @@ class _Bar(tqdm):
             self.set_postfix_str("", refresh=False)
         return super().update(n)
 
+    def __exit__(self, kind, *rest):
+        if kind is None:
+            self.delay = 0.0  # a short run is shown at its end
+        return super().__exit__(kind, *rest)
+
 
 def progress_bar(total: int, unit: str, done: int = 0, label: str | None = None) -> tqdm:
     """A bar on stderr with the estimated time left, seldom redrawn where that is a log file."""
-    interval = 0.1 if sys.stderr.isatty() else 10.0
+    interval, compiles = 0.1 if sys.stderr.isatty() else 10.0, unit in ("step", "run")
     bar = _Bar(
-        total=total, initial=done, unit=unit, desc=label, file=sys.stderr, mininterval=interval
-    )
-    if unit in ("step", "run"):
+        total=total, initial=done, unit=unit, desc=label, file=sys.stderr, mininterval=interval,
+        delay=0.0 if compiles else _AT_FIRST,
+    )  # fmt: skip
+    if compiles:
         bar.set_postfix_str(COMPILING)
     return bar
 

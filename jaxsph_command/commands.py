@@ -9,6 +9,7 @@ from importlib import import_module
 from .config import add_config_option, expanded, typed
 from .errors import Parser, report_errors
 
+_COMPLETION = ("what lets a shell complete these words", "jaxsph_command.completion")
 # command: what it does in a line, and the module that adds its options
 COMMANDS = {
     "jaxsph": {
@@ -18,6 +19,7 @@ COMMANDS = {
         "show": ("a quick look at a run, or at any other file of this project", "jaxsph.cli.show"),
         "export": ("write a run for ParaView", "jaxsph.cli.export"),
         "animate": ("draw a run as a moving picture", "jaxsph.cli.animate"),
+        "completion": _COMPLETION,
     },
     "jaxsph-rom": {
         "run": ("train, predict, compare with the full model", "jaxsph_rom.cli.run"),
@@ -31,6 +33,7 @@ COMMANDS = {
             "jaxsph_rom.cli.suggest",
         ),
         "advise": ("which setting to use for a wanted accuracy or time", "jaxsph_rom.cli.advise"),
+        "completion": _COMPLETION,
     },
 }
 _ABOUT = {

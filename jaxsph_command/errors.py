@@ -52,9 +52,7 @@ def report_errors(program: str, command, *arguments) -> int:
     usual = warnings.formatwarning
     warnings.formatwarning = lambda message, *_, **__: f"{program}: warning: {_line(message)}\n"
     try:
-        code = command(*arguments)
-        sys.stdout.flush()
-        return code
+        return _flushed(command, *arguments)
     except KeyboardInterrupt:
         return fail(program, "interrupted; what is kept goes on by the same command.", 130)
     except BrokenPipeError:
@@ -68,6 +66,17 @@ def report_errors(program: str, command, *arguments) -> int:
         return fail(program, f"{error}; choose another place.", 1)
     finally:
         warnings.formatwarning = usual
+
+
+def _flushed(command, *arguments) -> int:
+    """The command's exit code, all that it printed being out."""
+    try:
+        code = command(*arguments)
+    except SystemExit:  # as --help ends
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()
+    return code
 
 
 def fail(program: str, message: str, code: int) -> int:

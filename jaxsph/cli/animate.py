@@ -6,9 +6,9 @@ from pathlib import Path
 
 from jaxsph_command.errors import Parser
 
-from ..io import check_target, read_overview
+from ..io import read_overview
 from ..progress import progress_bar
-from .options import positive_int, print_rows, write_json
+from .options import add_json_option, positive_int, print_rows, write_json
 
 FRAMES = 100  # at most, unless more are asked for
 FIELDS = ("velocity", "pressure", "density")
@@ -23,7 +23,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     parser.set_defaults(command=_animate)
     add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run; it may still be written")
-    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
+    add_json_option(parser)
     add("--out", type=Path, metavar="DIR",
         help="folder of it, or a file ending with .gif or .mp4 (default: FILE's)")  # fmt: skip
     add("--field", choices=FIELDS, default="velocity", help="default: %(default)s")
@@ -36,8 +36,6 @@ def add_to(parser: Parser, words: list[str]) -> None:
 def _animate(options) -> int:
     from .. import plotting  # matplotlib takes its time to load
 
-    if options.json is not None:
-        check_target(options.json)
     path = options.out or options.file.parent
     path = path if path.suffix else path / f"{options.file.stem}.gif"
     overview = read_overview(options.file)

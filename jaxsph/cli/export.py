@@ -6,10 +6,10 @@ from pathlib import Path
 
 from jaxsph_command.errors import Parser
 
-from ..io import check_target, read_overview, write_vtkhdf
+from ..io import read_overview, write_vtkhdf
 from ..io.vtkhdf import EXPORTED
 from ..progress import progress_bar
-from .options import positive_int, print_rows, result_file, write_json
+from .options import add_json_option, positive_int, print_rows, result_file, write_json
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
@@ -23,7 +23,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run; it may still be written")
     add("--out", type=Path, metavar="DIR",
         help="folder of it, or a file ending with .vtkhdf (default: that of FILE)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
+    add_json_option(parser)
     add("--fields", nargs="+", choices=EXPORTED, default=EXPORTED, metavar="FIELD",
         help=f"of {', '.join(EXPORTED)} (default: all)")  # fmt: skip
     add("--every", type=positive_int, default=1, metavar="N",
@@ -32,8 +32,6 @@ def add_to(parser: Parser, words: list[str]) -> None:
 
 def _export(options) -> int:
     path = result_file(options.out, options.file.parent, f"{options.file.stem}.vtkhdf")
-    if options.json is not None:
-        check_target(options.json)
     overview = read_overview(options.file)
     count = -(-overview.snapshots // options.every)
     with progress_bar(count, "snapshot") as bar:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from jaxsph_command.scenes import SCALES as SCALES
 
 from ..arrangements import JitteredLattice, Lattice, Packed, Stirred
 from ..integrate import AutomaticSteps, FixedSteps
+from ..io import check_target
+from ..record import plain
 
 STEPPING = {"fixed": FixedSteps(), "automatic": AutomaticSteps()}
 ARRANGEMENTS = {
@@ -102,11 +105,42 @@ def result_file(out: Path | None, folder: Path, name: str) -> Path:
     return out if out.suffix == Path(name).suffix or out.is_file() else out / name
 
 
-def write_json(path: Path | None, results: dict[str, Any]) -> None:
-    """Write results where they are asked for."""
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """Add what every command takes that has results; `write_json` writes them."""
+    parser.add_argument(
+        "--json", type=_writable, metavar="FILE", help="write the results to FILE as well"
+    )
+
+
+def write_json(path: Path | None, results: Mapping[str, Any]) -> None:
+    """Write results where they are asked for, strict JSON: None for NaN and infinity."""
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(plain(dict(results)), indent=2, allow_nan=False)
+        path.write_text(text + "\n", encoding="utf-8")
+
+
+def _writable(text: str) -> Path:
+    """The path of a file that can be written."""
+    try:
+        check_target(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return Path(text)
+
+
+def bytes_in(folder: Path) -> int:
+    """Of all files in a folder and below it."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def bytes_told(count: int) -> str:
+    """Bytes as people read them."""
+    value, units = float(count), ["B", "kB", "MB", "GB", "TB"]
+    while value >= 1000.0 and len(units) > 1:
+        value /= 1000.0
+        units.pop(0)
+    return f"{value:.3g} {units[0]}"
 
 
 def print_rows(rows: dict[str, str]) -> None:

@@ -12,7 +12,7 @@ from jaxsph_command.errors import Parser
 from ..io import TrajectoryWriter, check_target
 from ..scenes import SCENES
 from ..wall_forces import WallForces
-from .options import STEPPING, margin
+from .options import STEPPING, add_json_option, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
 from .scene_functions import made, name_of, scene_function, unpacked
@@ -40,15 +40,13 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--out", type=Path, metavar="DIR", help="folder of the results (default: out/SCENE)")
-    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
+    add_json_option(parser)
     add("--overwrite", action="store_true", help="replace a trajectory.h5 that is there")
     add_resume_options(parser)
 
 
 def _run(options) -> int:
     make = options.make or scene_function(options.scene)
-    if options.json is not None:
-        check_target(options.json)
     check_resume_options(options, given(options) if options.scene in SCENES else [])
     if options.resume is not None:
         return resume(options, make)

@@ -12,6 +12,7 @@ from jaxsph_command.errors import Parser
 
 from ..scenes import SCENES, Scene
 from ..schemes import SCHEMES
+from .kinds import check_kind, plain_kinds
 from .options import ARRANGEMENTS, SCALES, finite_float, positive_float, positive_int, seed
 from .scene_functions import argument_lines, own_settings, scene_function, scene_word, setting
 
@@ -94,7 +95,12 @@ def scene_settings(options, make: Callable[..., Scene], precision: str) -> dict[
         settings["arrangement"] = rule(seed=options.seed or 0)
     if "scheme" in settings:
         settings["scheme"] = SCHEMES[options.scheme]
-    settings |= dict(options.set)
+    given = dict(options.set)
+    if "dtype" in given:
+        raise ValueError("--set: dtype is given by --precision, as float32 or float64.")
+    for name in given.keys() & takes.keys():
+        check_kind(takes[name], given[name])
+    settings |= given
     settings = own_settings(make, settings.items())
     return {**settings, "dtype": precision} if "dtype" in takes else settings
 
@@ -105,16 +111,13 @@ def _read_as(make: Callable[..., Scene], parameter: inspect.Parameter) -> dict[s
     words = getattr(sys.modules.get(make.__module__), f"{metavar}S", None)
     if isinstance(words, dict):  # LIDS, of all that `lid` can be
         return {"choices": tuple(words)}
-    kind = parameter.annotation
-    if kind is inspect.Parameter.empty:
-        kind = type(parameter.default)
-    kind = kind if isinstance(kind, str) else inspect.formatannotation(kind)
-    kind = kind.removesuffix(" | None")
-    if kind.startswith("tuple["):
-        parts = kind[len("tuple[") : -1].split(", ")
-        if set(parts) <= set(_KINDS):
-            return {"nargs": len(parts), "type": _KINDS[parts[0]], "metavar": metavar[0]}
-    return {"type": _KINDS.get(kind, _literal), "metavar": metavar}
+    if parameter.annotation is inspect.Parameter.empty:
+        read = _KINDS.get(type(parameter.default).__name__, _literal)
+        return {"type": read, "metavar": metavar}
+    kinds = plain_kinds(parameter)
+    if len(kinds) > 1:
+        return {"nargs": len(kinds), "type": _KINDS[kinds[0]], "metavar": metavar[0]}
+    return {"type": _KINDS[kinds[0]] if kinds else _literal, "metavar": metavar}
 
 
 def _literal(text: str) -> Any:

@@ -18,6 +18,9 @@ def tell_scenes(scene: str | None, scales: Sequence[str]) -> int:
         scales: at which scenes are built.
     """
     named = SCENES if scene is None else {scene: scene_function(scene)}
+    for make in named.values() if scales else ():
+        if "scale" not in inspect.signature(make).parameters:
+            raise ValueError("--scale: the scene has none; leave it out.")
     for name, make in named.items():
         summary = (inspect.getdoc(make) or "").partition("\n\n" if scene else "\n")[0]
         print(f"{name}: {' '.join(summary.split())}")
@@ -29,8 +32,6 @@ def tell_scenes(scene: str | None, scales: Sequence[str]) -> int:
 
 
 def _tell_built(make, scale: str) -> None:
-    if "scale" not in inspect.signature(make).parameters:
-        raise ValueError("--scale: the scene has none; leave it out.")
     scene = made(make, {"scale": scale, **unpacked(make)})
     if not all(scene.space.box.periodic):  # only periodic scenes pack their particles
         scene = made(make, {"scale": scale})

@@ -13,8 +13,9 @@ from ..io import Overview, check_target, read_overview, read_snapshot, read_wall
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
-from .options import print_rows, write_json
+from .options import add_json_option, bytes_told, print_rows, write_json
 from .show_contents import contents, file_format
+from .show_other import other_contents
 
 _SAMPLES = 20  # snapshots that are read of a long run, beside the last one
 
@@ -23,42 +24,50 @@ def add_to(parser: Parser, words: list[str]) -> None:
     """Add the command's options to its parser."""
     parser.description = (
         "Tell what a trajectory file holds: the scene, how far the run has come, and "
-        "what its particles do. The file may still be written. Of other files, sweeps, models and "
-        "predictions, tell what is in them."
+        "what its particles do. The file may still be written. Of other files that commands leave, "
+        "sweeps, models, predictions, options, results, pages and pictures, tell what is in them."
     )
     parser.set_defaults(command=_show)
     add = parser.add_argument
     add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, or another file")
     add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
-    add("--json", type=Path, metavar="FILE", help="write what is shown to FILE as well")
+    add_json_option(parser)
 
 
 def _show(options) -> int:
-    for target in (options.figure, options.json):
-        if target is not None:
-            check_target(target)
-    if file_format(options.file) not in (None, FORMAT):
+    if options.figure is not None:
+        check_target(options.figure)
+    rows = _contents(options.file)
+    if rows is not None:
         if options.figure is not None:
             raise ValueError(f"--figure: {options.file} is no run, so there is nothing to draw.")
-        rows = {"file": f"{options.file}, {_size(options.file.stat().st_size)}"}
-        rows |= contents(options.file)
+        rows = {"file": f"{options.file}, {bytes_told(options.file.stat().st_size)}", **rows}
         print_rows(rows)
         write_json(options.json, rows)
         return 0
     overview = read_overview(options.file)
     measures = _measures(options.file, overview)
-    print_rows({"file": f"{options.file}, {_size(overview.size)}", **_rows(overview, measures)})
-    if options.json is not None:
-        shown = {**vars(overview), **vars(overview.schedule), "steps": overview.schedule.steps}
-        del shown["schedule"]
-        write_json(options.json, {**shown, **measures})
+    rows = {"file": f"{options.file}, {bytes_told(overview.size)}", **_rows(overview, measures)}
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
         walls = read_walls(options.file)
         save(snapshot_figure(*read_snapshot(options.file), walls=walls), options.figure)
-        print_rows({"figure": str(options.figure)})
+        rows["figure"] = str(options.figure)
+    print_rows(rows)
+    if options.json is not None:
+        shown = {**vars(overview), **vars(overview.schedule), "steps": overview.schedule.steps}
+        del shown["schedule"]
+        write_json(options.json, {**shown, **measures})
     return 0
+
+
+def _contents(path: Path) -> dict[str, str] | None:
+    """What is in a file that is no run; None for a run."""
+    rows = other_contents(path)
+    if rows is None and file_format(path) not in (None, FORMAT):
+        return contents(path)
+    return rows
 
 
 def _measures(path: Path, overview: Overview) -> dict[str, Any]:
@@ -119,12 +128,3 @@ def _coefficients(told: dict[str, Any]) -> str:
         f"{told['lift_coefficient']:.5g} (last fifth; {told['reference_speed']:g} m/s, "
         f"{told['reference_length']:g} m)"
     )
-
-
-def _size(count: int) -> str:
-    """Bytes as people read them."""
-    value, units = float(count), ["B", "kB", "MB", "GB", "TB"]
-    while value >= 1000.0 and len(units) > 1:
-        value /= 1000.0
-        units.pop(0)
-    return f"{value:.3g} {units[0]}"

@@ -13,11 +13,18 @@ import numpy as np
 from jaxsph_command.config import NAME, write_config
 from jaxsph_command.errors import Parser
 
+from ..environment import environment
 from ..integrate import explanation
-from ..io import check_target
 from ..progress import progress_bar
-from ..sweeps import sweep
-from .options import positive_int, print_rows, result_file, reynolds_numbers, write_json
+from ..sweeps import sweep, sweep_file
+from .options import (
+    add_json_option,
+    positive_int,
+    print_rows,
+    result_file,
+    reynolds_numbers,
+    write_json,
+)
 from .scene_functions import made, name_of, scene_function
 from .scene_options import add_scene_options, scene_settings
 
@@ -44,14 +51,12 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "(default: %(default)s)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder of the results, or a file "
         "ending with .h5 (default: out/SCENE)")
-    add("--json", type=Path, metavar="FILE", help="write the results to FILE as well")
+    add_json_option(parser)
 
 
 def _sweep(options) -> int:
     make = options.make or scene_function(options.scene)
     path = result_file(options.out, Path("out", name_of(options.scene, make)), "sweep.h5")
-    if options.json is not None:
-        check_target(options.json)
     precision = options.precision or "float64"
     pairs = itertools.product(sum(options.reynolds, []), options.seed or [None])
     with jax.enable_x64(precision == "float64"):
@@ -60,8 +65,9 @@ def _sweep(options) -> int:
             member = argparse.Namespace(**{**vars(options), "reynolds": reynolds, "seed": number})
             scenes.append(made(make, scene_settings(member, make, precision)))
         before = clock.perf_counter()
+        sweep_file.create(path, scenes)  # meets a file of something else
+        write_config(path.with_name(NAME), options)
         with progress_bar(len(scenes), "run") as bar:
-            write_config(path.with_name(NAME), options)
             status = sweep(scenes, path, batch=options.batch, progress=bar.update)
     lost = np.flatnonzero(status.code)
     for number in lost[:_FAULTS_SHOWN]:
@@ -77,5 +83,5 @@ def _sweep(options) -> int:
         "sweep": str(path),
     }
     print_rows(rows)
-    write_json(options.json, rows)
+    write_json(options.json, {**rows, **environment()})
     return 1 if len(lost) == len(scenes) else 0

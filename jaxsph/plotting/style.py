@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -41,11 +42,23 @@ def sheet(width: float, height: float, layout: str = "constrained") -> Figure:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
-    """Write the figure, the format by the path's ending, and return the path."""
+    """Write the figure, the format by the path's ending, and return the path.
+
+    Raises:
+        ValueError: if there is no such format.
+    """
     path = Path(path)
+    check_ending(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=RESOLUTION, facecolor="white", bbox_inches="tight", pad_inches=0.1)
     return path
+
+
+def check_ending(path: Path) -> None:
+    """A ValueError if no figure can be written with a path's ending."""
+    known = FigureCanvasBase.get_supported_filetypes()
+    if path.suffix.removeprefix(".") not in known:
+        raise ValueError(f"{path}: figures end with .png, .pdf or .svg; name it so.")
 
 
 def png(figure: Figure) -> bytes:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from jaxsph.cli import Parser, print_rows
-from jaxsph.io import check_target
+from jaxsph.cli.options import add_json_option, write_json
 
 from .. import advice
 from ..advice import Advice, Row
@@ -34,7 +33,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
         help="that a run may take, as 10s, 200ms or 2min")  # fmt: skip
     add("--table", type=Path, default=advice.TABLE, metavar="FILE",
         help="of measurements (default: the package's own)")  # fmt: skip
-    add("--json", type=Path, metavar="FILE", help="write the answer there as well")
+    add_json_option(parser)
 
 
 def _read(rule: Callable[[str], float]) -> Callable[[str], float]:
@@ -50,8 +49,6 @@ def _read(rule: Callable[[str], float]) -> Callable[[str], float]:
 
 
 def _advise(options) -> int:
-    if options.json is not None:
-        check_target(options.json)
     table = advice.read_table(options.table)
     if options.scene not in table["scenes"]:
         raise ValueError(
@@ -60,9 +57,7 @@ def _advise(options) -> int:
     scene = table["scenes"][options.scene]
     wanted = (options.velocity_error, options.pressure_error, options.time_budget)
     found = advice.advise(scene["rows"], *wanted)
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(_results(found, table), indent=2) + "\n")
+    write_json(options.json, _results(found, table))
     if not found.reached:
         print(f"None of {len(scene['rows'])} settings is {_asked(*wanted)}. The best there is:")
     print_rows(_cells(found.best))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from itertools import product
@@ -21,27 +20,28 @@ from jaxsph.cli import (
     reynolds_numbers,
     seed,
 )
-from jaxsph.cli.options import MOST_NUMBERS
+from jaxsph.cli.options import MOST_NUMBERS, add_json_option, write_json
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError, explanation
 from jaxsph.io import check_target
 
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
-from ..report.plain import plain
 from .options import bar, by_name, named_numbers, said
 from .train import print_errors
 
 _MOST_FILES = 100  # with fields or tracers
 _MOST_BYTES = 4 * 2**30  # of all coordinates
 _FAULTS_SHOWN = 5
+_MEMBERS_IN = ("fields", "tracers")  # folders beside prediction.h5
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
     """Add the command's options to its parser."""
     parser.description = (
         "Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
-        "of parameters at once, and write their coordinates over time to DIR/prediction.h5."
+        "of parameters at once, and write their coordinates over time to DIR/prediction.h5. Those "
+        "of an earlier prediction in DIR are removed, with its fields and tracers."
     )
     parser.set_defaults(command=_predict)
     add = parser.add_argument
@@ -61,15 +61,13 @@ def add_to(parser: Parser, words: list[str]) -> None:
         f"drawn by --seed, at each of them if N is larger (up to {_MOST_FILES} runs)")  # fmt: skip
     add("--seed", type=seed, default=0, metavar="N", help="of the draw (default: 0)")
     add("--out", type=Path, metavar="DIR", help="folder for results (default: out/predict-MODEL)")
-    add("--json", type=Path, metavar="FILE", help="write what the table says to FILE as well")
+    add_json_option(parser)
 
 
 def _predict(options) -> int:
     folder = options.out or Path("out", f"predict-{options.model.stem}")
     path = folder / "prediction.h5"
-    for target in (path, options.json):
-        if target is not None:
-            check_target(target)
+    check_target(path)
     with jax.enable_x64(True):  # whatever the file holds is kept
         trained = load(options.model)
     with jax.enable_x64(trained.flow.reference.points.dtype == np.float64):
@@ -81,13 +79,11 @@ def _predict(options) -> int:
                 dict(zip(trained.names, points.T, strict=True)), times=times, progress=report
             )
         _warn(trained, prediction)
+        _remove_earlier(folder)
         save_prediction(path, prediction, options.model.name)
         lost = _write_members(options, trained, prediction, folder)
     results = _results(options, trained, prediction, path)
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(plain({**results, **environment()}), indent=2)
-        options.json.write_text(text + "\n")
+    write_json(options.json, {**results, **environment()})
     _print(results, trained, prediction)
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
@@ -112,9 +108,11 @@ def _times(options, trained: TrainedModel) -> np.ndarray | None:
     nearest = count * trained.schedule.interval
     if abs(nearest - options.t_end) > 1e-6 * nearest:
         raise ValueError(
-            f"t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
+            f"--t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
             f"{trained.schedule.interval:g} s; the nearest is {nearest:g} s."
         )
+    if count * trained.flow.basis.size * 8 > _MOST_BYTES:
+        raise ValueError(f"--t-end: {count} snapshots are too many to keep; give an earlier end.")
     return trained.schedule.interval * np.arange(count + 1)
 
 
@@ -156,6 +154,16 @@ def _title(name: str) -> str:
 
 def _said(prediction: Prediction, member: int) -> str:
     return said(dict(zip(prediction.names, map(float, prediction.points[member]), strict=True)))
+
+
+def _remove_earlier(folder: Path) -> None:
+    """Take away the members of an earlier prediction, which would stand beside this one's."""
+    for name in _MEMBERS_IN:
+        for pattern in ("re-*.h5", "member-*.h5", "re-*.vtkhdf", "member-*.vtkhdf"):
+            for file in (folder / name).glob(pattern):
+                file.unlink()
+        if (folder / name).is_dir() and not any((folder / name).iterdir()):
+            (folder / name).rmdir()
 
 
 def _names(prediction: Prediction) -> list[str]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import json
+import textwrap
 from pathlib import Path
 
 import jax
 
 from jaxsph.cli import Parser, fail, positive_float, positive_int
+from jaxsph.cli.options import add_json_option, bytes_in, bytes_told, write_json
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
@@ -26,10 +29,12 @@ from ..projection import (
     MemoryLength,
     SpectralMemory,
 )
-from ..report import format_table
+from ..report import Case, best, format_table, verdict
+from ..report.table import WIDTH
 from ..splines import LocalSplines
 from ..still_walls import check_still
 from ..study import PLANS, OnParticles, OnPoints, Plan, Study, write_study
+from ..study.write import MODEL
 from .options import (
     PRODUCTS,
     add_closure_options,
@@ -109,7 +114,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
         "0.25)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
-    add("--json", type=Path, metavar="FILE", help="write the report there, not to DIR/report.json")
+    add_json_option(parser)
 
 
 def memory_length(text: str) -> float | MemoryLength:
@@ -126,9 +131,8 @@ def memory_length(text: str) -> float | MemoryLength:
 
 def _run(options) -> int:
     folder = options.out or Path("out", f"rom-{name_of(options.scene, options.make)}")
-    report = folder / "report.json" if options.json is None else options.json
+    report = folder / "report.json"
     check_target(report)
-    check_target(folder / "report.json")
     check_target(folder / "report.html")
     for name, value in (PAPERS if options.faithful else BEST).items():
         if getattr(options, name) is None:
@@ -149,12 +153,35 @@ def _run(options) -> int:
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
         write_config(folder / NAME, options)
-        write_study(study, experiments, outcomes, folder, report)
+        write_study(study, experiments, outcomes, folder)
+    if options.json is not None:
+        write_json(options.json, json.loads(report.read_text()))
     print(format_table([outcome.case for outcome in outcomes]))
     if plan.judged_from:
         print(f"peaks and medians are taken from t = {plan.judged_from:g} s on")
+    _print_verdict([outcome.case for outcome in outcomes], folder, plan)
     print(f"\nreport: {folder / 'report.html'}, {report}\nfigures: {folder}/*.png")
+    _print_disk(folder)
     return 0
+
+
+def _print_verdict(cases: list[Case], folder: Path, plan: Plan) -> None:
+    """What the table comes to, and how to use the model that it speaks for."""
+    for text in verdict(cases):
+        print("\n" + textwrap.fill(text, WIDTH))
+    if (folder / MODEL).exists():
+        told = best([case for case in cases if case.hyper != "none"])[0]
+        print(f"\n{folder / MODEL} is the model on points with M = {told.modes}; run it by\n"
+              f"  jaxsph-rom predict {folder / MODEL} --reynolds {plan.predict[0]:g}")  # fmt: skip
+    elif not any(case.time_ratio is not None and case.time_ratio > 1.0 for case in cases):
+        print("\nModels on points are the fast ones: add --hyper tensor.")
+
+
+def _print_disk(folder: Path) -> None:
+    """What the folder takes, and what of it only spares running again."""
+    kept = [bytes_in(folder / name) for name in ("full", "reduced")]
+    print(f"disk: {bytes_told(bytes_in(folder))} in {folder}, {bytes_told(sum(kept))} of it runs "
+          "that are kept: the same command goes on from them")  # fmt: skip
 
 
 def _plan(options) -> Plan:

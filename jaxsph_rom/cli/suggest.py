@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import jax
 import numpy as np
 
 from jaxsph.cli import Parser, print_rows
-from jaxsph.io import check_target
+from jaxsph.cli.options import add_json_option, write_json
+from jaxsph.environment import environment
 
 from ..points import load
 from .options import said
@@ -23,21 +23,17 @@ def add_to(parser: Parser, words: list[str]) -> None:
     )
     parser.set_defaults(command=_suggest)
     parser.add_argument("model", type=Path, metavar="FILE", help="of the model")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write it to FILE as well")
+    add_json_option(parser)
 
 
 def _suggest(options) -> int:
-    if options.json is not None:
-        check_target(options.json)
     with jax.enable_x64(True):
         trained = load(options.model)
     with jax.enable_x64(trained.flow.reference.points.dtype == np.float64):
         point = trained.suggest()
         expected = float(trained.predict(point).error_indicator[0])
-    if options.json is not None:
-        results = {"parameters": point, "error_indicator": expected}
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(results, indent=2) + "\n")
+    results = {"parameters": point, "error_indicator": expected}
+    write_json(options.json, {**results, **environment()})
     print_rows({
         "train next at": said(point),
         "expected error": f"{100.0 * expected:.2g} % of velocity there",

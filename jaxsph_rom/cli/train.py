@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import jax
 
 from jaxsph import Trajectory
 from jaxsph.cli import Parser, fail, positive_int, print_rows
-from jaxsph.cli.options import result_file
+from jaxsph.cli.options import add_json_option, bytes_in, bytes_told, result_file, write_json
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
@@ -31,7 +30,6 @@ from ..points import (
 )
 from ..points.training.linear_closure import held_back
 from ..points.training.training import check_family
-from ..report.plain import plain
 from ..study import Plan, full_run
 from .options import (
     PRODUCTS,
@@ -71,16 +69,14 @@ def add_to(parser: Parser, words: list[str]) -> None:
         help="where full runs are kept (default: --out, or out/train-SCENE)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder of the model and its "
         "full runs, or a file ending with .h5 (default: out/train-SCENE)")
-    add("--json", type=Path, metavar="FILE", help="write what it cost to FILE as well")
+    add_json_option(parser)
 
 
 def _train(options) -> int:
     usual = Path("out", f"train-{name_of(options.scene, options.make)}")
     path = result_file(options.out, options.runs or usual, "model.h5")
     folder = options.runs or (usual if options.out in (None, path) else options.out)
-    for target in (path, options.json):
-        if target is not None:
-            check_target(target)
+    check_target(path)
     with jax.enable_x64(options.precision == "float64"):
         values = trained_at(options)
         plan = _plan(options, values)
@@ -119,11 +115,8 @@ def _train(options) -> int:
         )
         trained.save(path)
         write_config(path.with_name(NAME), options)
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        results = plain(_results(trained, path))
-        options.json.write_text(json.dumps({**results, **environment()}, indent=2) + "\n")
-    _print(trained, runs[0].particles, path)
+    write_json(options.json, {**_results(trained, path), **environment()})
+    _print(trained, runs[0].particles, path, folder)
     return 0
 
 
@@ -176,7 +169,7 @@ def _results(trained: TrainedModel, path: Path) -> dict[str, Any]:
     }
 
 
-def _print(trained: TrainedModel, particles: int, path: Path) -> None:
+def _print(trained: TrainedModel, particles: int, path: Path, folder: Path) -> None:
     made = trained.training
     closure = made["closure"]
     if closure != "none":
@@ -191,7 +184,8 @@ def _print(trained: TrainedModel, particles: int, path: Path) -> None:
         "full runs": f"{made['full_seconds']:.3g} s",
         "offline": f"{made['offline_seconds']:.3g} s (map, decompose, project)",
         "closure": closure,
-        "model": str(path),
+        "model": f"{path}, {bytes_told(path.stat().st_size)}",
+        "runs kept": f"{bytes_told(bytes_in(folder / 'full'))} in {folder / 'full'}",
     })  # fmt: skip
     print_errors(made)
 

@@ -11,3 +11,5 @@ from .html_report import Shown as Shown
 from .html_report import write_html_report as write_html_report
 from .json_report import write_report as write_report
 from .table import format_table as format_table
+from .verdict import best as best
+from .verdict import verdict as verdict

@@ -35,6 +35,9 @@ class Case:
         fom_compile_seconds, rom_compile_seconds: wall-clock time of compilation [s].
         compression_factor: N_d / M, numbers of the full state per reduced coordinate.
         memory: rule and constant that gave tau, `auto-0.2` say; None where it was given itself.
+        training_seconds: run time of the full runs that it was trained on [s].
+        offline_seconds: wall-clock time in which it was made of them, its closure's training
+            included [s].
         fault: why it is unstable, or None.
         fault_time: simulated time at which it failed [s], or None.
     """
@@ -60,6 +63,8 @@ class Case:
     rom_compile_seconds: float | None
     compression_factor: float | None
     memory: str | None = None
+    training_seconds: float | None = None
+    offline_seconds: float | None = None
     fault: str | None = None
     fault_time: float | None = None
 

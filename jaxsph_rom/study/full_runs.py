@@ -49,6 +49,10 @@ class FullRuns:
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)
 
+    def seconds(self, reynolds: float) -> float:
+        """Run time of a full run [s], without compilation."""
+        return self.full(reynolds).timing.seconds(self.scene(reynolds).steps)
+
     def probes(self, reynolds: float) -> np.ndarray:
         """Where runs are compared (P, n) [m]."""
         return self._probes(self.scene(reynolds))

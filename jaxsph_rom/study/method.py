@@ -12,6 +12,7 @@ import numpy as np
 from jaxsph import SimulationError, Trajectory
 
 from ..basis import Basis
+from ..points import TrainedModel
 from ..reference import ReferenceSpace
 from .full_runs import FullRuns
 
@@ -56,6 +57,7 @@ class ReducedRun:
         fault: that ended it, if any.
         told: values of the report's `Case` that only the method knows.
         made_of: tells what the model is made of.
+        model: that runs at any parameters, where the method makes one.
     """
 
     reynolds: float
@@ -64,6 +66,7 @@ class ReducedRun:
     fault: SimulationError | None
     told: dict[str, Any]
     made_of: Callable[[], ModelBasis]
+    model: TrainedModel | None = None
 
 
 class Method(abc.ABC):

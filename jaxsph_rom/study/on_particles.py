@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time as clock
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, final
@@ -75,6 +76,7 @@ class OnParticles(Method):
     def run(self, runs, experiment):
         for reynolds in dict.fromkeys(experiment.trained_on + experiment.reynolds):
             runs.full(reynolds)
+        before = clock.perf_counter()
         basis = self.basis(runs, experiment, max(experiment.modes))
         made_of = cache(partial(self._made_of, runs, experiment))
         scene = runs.scene(experiment.trained_on[0])
@@ -82,6 +84,10 @@ class OnParticles(Method):
         values = basis.functions.reshape(len(points), -1)
         numbers = np.arange(values.shape[1]).reshape(basis.modes.shape[1], -1)
         interpolation = self.interpolation.fit(points, values, scene.space, self.spline_order)
+        told = {
+            "trained_on": experiment.trained_on,
+            "offline_seconds": clock.perf_counter() - before,
+        }
         for modes in experiment.modes:
             part = basis.truncated(modes)
             kept = interpolation.select(
@@ -90,8 +96,8 @@ class OnParticles(Method):
             for reynolds in experiment.reynolds:
                 for projection in self.projections:
                     parts = part, kept, projection
-                    run = self._reduced(runs, experiment.trained_on, reynolds, *parts)
-                    yield ReducedRun(reynolds, *run, made_of)
+                    *run, more = self._reduced(runs, experiment.trained_on, reynolds, *parts)
+                    yield ReducedRun(reynolds, *run, told | more, made_of)
 
     def _made_of(self, runs: FullRuns, experiment: Experiment) -> ModelBasis:
         of_all = experiment.trained_on, self.product, self.centring

@@ -97,10 +97,12 @@ class OnPoints(Method):
             "trained_on": trained_on,
             "rom_seconds": found.run_seconds if fault is None else None,
             "rom_compile_seconds": found.compile_seconds,
+            "offline_seconds": trained.training["offline_seconds"]
+            + trained.training.get("closure_seconds", 0.0),
         }
         profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
         made_of = partial(self._made_of, runs, trained_on, flow)
-        return ReducedRun(reynolds, found.fields(0), profile, fault, told, made_of)
+        return ReducedRun(reynolds, found.fields(0), profile, fault, told, made_of, trained)
 
     def _made_of(self, runs: FullRuns, trained_on, flow) -> ModelBasis:
         lagrangian = runs.lagrangian_basis(trained_on, self.product)

@@ -12,6 +12,7 @@ from jaxsph import Trajectory
 from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
+from ..points import TrainedModel
 from ..report import Case
 from .full_runs import FullRuns
 from .method import Experiment, Method, ModelBasis, ReducedRun
@@ -31,6 +32,7 @@ class Outcome:
         trajectory: of the reduced model, as far as it came.
         profile: velocity norm and pressure on the probes over time, each (S, P).
         made_of: tells what the model is made of.
+        model: that runs at any parameters, where the method makes one.
     """
 
     case: Case
@@ -40,6 +42,7 @@ class Outcome:
     trajectory: Trajectory
     profile: tuple[np.ndarray, np.ndarray]
     made_of: Callable[[], ModelBasis]
+    model: TrainedModel | None = None
 
 
 class Study:
@@ -110,7 +113,8 @@ class Study:
             pressure_peak_percent=float(percent[1][judged].max()),
             pressure_median_percent=float(np.median(percent[1][judged])),
             stable=fault is None,
-            fom_seconds=full.timing.seconds(scene.steps),
+            fom_seconds=self.runs.seconds(run.reynolds),
+            training_seconds=sum(map(self.runs.seconds, run.told["trained_on"])),
             fom_steps=scene.steps,
             rom_steps=scene.steps if fault is None else fault.step,
             fom_compile_seconds=full.timing.compile_seconds,
@@ -119,7 +123,7 @@ class Study:
             fault_time=None if fault is None else fault.step * scene.time_step,
             **run.told,
         )
-        return Outcome(case, time, *percent, run.trajectory, run.profile, run.made_of)
+        return Outcome(case, time, *percent, run.trajectory, run.profile, run.made_of, run.model)
 
 
 def _percent(reference: np.ndarray, values: np.ndarray) -> np.ndarray:

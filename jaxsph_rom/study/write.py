@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,13 @@ from ..report import (
     Case,
     Profile,
     Shown,
+    best,
     centre_line_profiles,
     discrepancy_history,
     field_snapshots,
     modes,
     singular_values,
+    verdict,
     write_html_report,
     write_report,
 )
@@ -27,9 +30,14 @@ from .full_runs import FullRuns
 from .method import Experiment, ModelBasis
 from .study import Outcome, Study
 
+MODEL = "model.h5"  # the file of a model on points, beside the report
 _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
 _SETTINGS = ("advection", "map", "interpolation", "spline_order", "judged_from")
+_WRITTEN = (
+    "singular_values*.png", "modes*.png", "fields_re_*.png", "discrepancy.png", "centre_line.png",
+    MODEL,
+)  # fmt: skip
 _LISTED_MODES = (2, 5, 10, 20, 30)
 
 
@@ -38,18 +46,19 @@ def write_study(
     experiments: Sequence[Experiment],
     outcomes: Sequence[Outcome],
     folder: Path,
-    json_path: Path | None = None,
     profile_time: float | None = None,
 ) -> dict[str, Any]:
-    """Write the figures of a study, `report.json` and `report.html` into a folder.
+    """Write the figures of a study, `report.json`, `report.html` and `model.h5` into a folder.
+
+    The model is that on reference points which errs least, if there is one. Figures and a model of
+    an earlier study in the folder are removed.
 
     Args:
         study: made the runs.
         experiments: each with a basis of its own; the figures of bases are numbered if there are
             several.
         outcomes: of all experiments.
-        folder: where figures and `report.html` go, and `report.json` unless `json_path` is given.
-        json_path: where `report.json` goes.
+        folder: where all of them go.
         profile_time: at which profiles and fields are shown [s]; half the run if none is given.
 
     Returns:
@@ -57,6 +66,9 @@ def write_study(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    for pattern in _WRITTEN:
+        for earlier in folder.glob(pattern):
+            earlier.unlink()
     bases: list[dict[str, Any]] = []
     basis_figures: list[Shown] = []
     shown_of = [outcome for e in experiments for outcome in _largest(e, outcomes)]
@@ -75,6 +87,7 @@ def write_study(
         "parameters": first.parameters,
         "map": ", ".join(dict.fromkeys(basis["map"] for basis in bases)),
         "judged_from": study.judged_from,
+        "verdict": verdict([outcome.case for outcome in outcomes]),
         **settings,
     }
     history = discrepancy_history(
@@ -89,10 +102,16 @@ def write_study(
     if first.space.box.dim == 2:
         shown += _fields(study.runs, outcomes, folder, profile_time)
     cases, made_on = [outcome.case for outcome in outcomes], environment()
-    write_report(json_path or folder / "report.json", cases, made_on, extra)
+    write_report(folder / "report.json", cases, made_on, extra)
     told = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
     told.pop("reynolds", None)  # each case has its own
     write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on)
+    on_points = [outcome for outcome in outcomes if outcome.model is not None]
+    if on_points:
+        chosen = best([outcome.case for outcome in on_points])[0]
+        model = next(o.model for o in on_points if o.case is chosen)
+        made = model.training | {"inner_product": chosen.inner_product}
+        dataclasses.replace(model, training=made).save(folder / MODEL)
     return extra
 
 

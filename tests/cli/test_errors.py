@@ -1,5 +1,6 @@
 """What commands say of bad input and of what they warn of."""
 
+import argparse
 import os
 import re
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 
 import jaxsph
 from jaxsph.cli import report_errors
+from jaxsph_command.commands import COMMANDS, parser
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(jaxsph.__file__).parents[1])}
 
@@ -66,10 +68,15 @@ def test_an_interrupt_is_one_line(module, when):
     assert re.fullmatch(f"{program}: error: interrupted.*\n", done.stderr), done.stderr
 
 
-def test_a_reader_that_has_gone_is_no_error():
+@pytest.mark.parametrize("at_once", [True, False])
+@pytest.mark.parametrize("line", ["jaxsph scenes", "jaxsph run dam-break --help"])
+def test_a_reader_that_has_gone_is_no_error(line, at_once):
+    """Whether lines are written one by one or all at the end."""
+    module, *words = line.split()
     script = (
-        "import sys; from jaxsph.cli import main\n"
-        "sys.stdout.reconfigure(write_through=True); sys.exit(main(['scenes']))"
+        f"import sys, jaxsph_command; sys.argv[1:] = {words}\n"
+        f"sys.stdout.reconfigure(write_through={at_once})\n"
+        f"sys.exit(jaxsph_command.{module}())"
     )
     command = [sys.executable, "-c", script]
     with subprocess.Popen(
@@ -77,4 +84,19 @@ def test_a_reader_that_has_gone_is_no_error():
     ) as process:
         process.stdout.close()
         assert process.stderr.read() == ""
-    assert process.returncode == 141
+    # as a shell says of a program that SIGPIPE ended; argparse itself passes over it
+    assert process.returncode == (0 if at_once and "--help" in words else 141)
+
+
+@pytest.mark.parametrize("program", COMMANDS)
+def test_results_are_asked_for_alike(program):
+    """All commands with results take `--json FILE`, and say the same of it."""
+    for name, (_, module) in COMMANDS[program].items():
+        command = parser(program, [name]).chosen
+        (told,) = [a for a in command._actions if a.dest == "json"] or [None]
+        if name in ("scenes", "completion"):
+            assert told is None
+            continue
+        assert told.help == "write the results to FILE as well" and told.metavar == "FILE", module
+        with pytest.raises(argparse.ArgumentTypeError, match="is a folder; name a file"):
+            told.type(os.getcwd())

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import jaxsph
 from jaxsph.arrangements import Lattice
 from jaxsph.cli import main
 from jaxsph.cli.animate import FIELDS
-from jaxsph.cli.show import _size
+from jaxsph.cli.options import bytes_told
 from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.plotting import FIELDS as DRAWN
 from jaxsph.sweeps import sweep_file
@@ -112,8 +113,42 @@ def test_show_of_other_files(capsys):
     assert shown(capsys)["VTKHDF/Points"] == "1280 x 3, float64 [m]"
 
 
+def test_show_of_what_a_run_leaves(capsys):
+    run = "run taylor-green --resolution 12 --arrangement lattice --t-end 0.02 --out a"
+    assert main([*run.split(), "--json", "a/r.json"]) == 0
+    assert main(["animate", "a/trajectory.h5", "--every", "1"]) == 0
+    assert main(["show", "a/trajectory.h5", "--figure", "a/f.png"]) == 0
+    capsys.readouterr()
+    found = {}
+    for name in ("run.toml", "r.json", "report.html", "trajectory.gif", "f.png"):
+        assert main(["show", f"a/{name}", "--json", "shown.json"]) == 0
+        found[name] = json.loads(Path("shown.json").read_text())
+    assert found["run.toml"]["resolution"] == "12" and found["run.toml"]["command"] == "run"
+    assert found["run.toml"]["run again by"] == "jaxsph run --config a/run.toml --out DIR"
+    assert found["r.json"]["scene"] == "taylor-green" and found["r.json"]["particles"] == "144"
+    error = json.loads(Path("a/r.json").read_text())["errors"]["velocity_relative_l2"]
+    assert found["r.json"]["errors.velocity_relative_l2"] == f"{error:.6g}"
+    assert found["r.json"]["versions.jaxsph"] == jaxsph.__version__
+    assert "taylor-green" in found["report.html"]["title"]
+    frames = len(read_trajectory("a/trajectory.h5").time)
+    assert int(found["trajectory.gif"].get("frames", 1)) == frames > 1
+    with Image.open("a/f.png") as picture:
+        size = f"{picture.width} x {picture.height} pixels"
+    assert found["f.png"]["size"] == size
+    # every kind of file that is there can be shown
+    for path in Path("a").iterdir():
+        assert main(["show", str(path), "--json", "shown.json"]) == 0
+    many = {"cases": [{"re": k, "errors": [0.5] * 40} for k in range(5)], "nothing": None}
+    with open("many.json", "w") as file:
+        json.dump(many, file)
+    assert main(["show", "many.json"]) == 0
+    rows = shown(capsys)
+    assert rows["cases.0.re"] == "0" and rows["cases"] == "5 in all"
+    assert rows["cases.2.errors"] == "40 values" and rows["nothing"] == "None"
+
+
 def test_sizes():
-    assert [_size(n) for n in (999, 70800, 1.5e9, 2e15)] == [
+    assert [bytes_told(n) for n in (999, 70800, 1.5e9, 2e15)] == [
         "999 B",
         "70.8 kB",
         "1.5 GB",

@@ -1,12 +1,16 @@
 """`jaxsph-rom run`: results, resuming, and one clear line for bad input."""
 
 import json
+import math
+import re
 
 import pytest
 
-from jaxsph_rom import ConvectiveMemory, SpectralMemory
+from jaxsph.cli.options import bytes_told
+from jaxsph_rom import ConvectiveMemory, SpectralMemory, load
 from jaxsph_rom.cli import main
 from jaxsph_rom.cli.run import memory_length
+from jaxsph_rom.report import Case, verdict
 from tests.pages import checked_page
 
 SMALL = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--arrangement", "lattice",
@@ -149,5 +153,22 @@ def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
     assert own["cumulative_energy_percent"] != points["cumulative_energy_percent"]
     assert report["map"] == "QuadraticMap, MovingLeastSquaresMap" and report["spline_order"] == 3
     assert {"modes_1.png", "modes_2.png"} <= {path.name for path in tmp_path.glob("*.png")}
-    assert "hyper-reduction tensor" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "hyper-reduction tensor" in printed
+    # what the verdict says is what was measured
+    cost = fixed["training_seconds"] + fixed["offline_seconds"]
+    assert 0.0 < fixed["training_seconds"] < cost and moving["offline_seconds"] > 0.0
+    runs = math.ceil(cost / (fixed["fom_seconds"] - fixed["rom_seconds"]))
+    words = " ".join(printed.split())
+    assert f"Making it took {cost:.3g} s" in words and f"paid back after {runs} run" in words
+    assert f"velocity within {fixed['velocity_peak_percent']:.2g} %" in words
+    assert verdict([Case(**moving), Case(**fixed)])[1] in words
+    # the command that it ends with, and what the folder takes
+    (command,) = re.findall(r"jaxsph-rom (predict .*)", printed)
+    assert main([*command.split(), "--out", str(tmp_path / "predicted")]) == 0
+    assert load(tmp_path / "model.h5").names == ("reynolds",)
+    told = re.search(rf"disk: (\S+) (\w+) in {tmp_path}, (\S+) (\w+) of it runs", printed)
+    kept = sum(p.stat().st_size for name in ("full", "reduced")
+               for p in (tmp_path / name).rglob("*") if p.is_file())  # fmt: skip
+    assert bytes_told(kept) == " ".join(told.groups()[2:]) and kept > 1e4
     assert (tmp_path / "fields_re_150.png").exists()

@@ -47,6 +47,26 @@ def test_what_a_model_cost_and_gets_wrong(folder):
     assert trained.schedule.end_time == pytest.approx(0.05) and trained.scene == "taylor-green"
 
 
+def test_nothing_of_an_earlier_prediction_stays_beside_a_new_one(folder, tmp_path):
+    def there():
+        return {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+
+    here = ["--out", str(tmp_path)]
+    assert predict(folder, "--reynolds", "110", "120", "--fields", "--tracers", "9", *here) == 0
+    before = there()
+    assert before == {"prediction.h5", *(f"{kind}/re-{number}.h5" for number in (110, 120)
+                                         for kind in ("fields", "tracers"))}  # fmt: skip
+    (tmp_path / "fields" / "notes.txt").write_text("mine")  # no file of a prediction
+    # one that is refused takes nothing away
+    assert predict(folder, "--reynolds", "110", "--t-end", "0.012", *here) == 2
+    assert there() == before | {"fields/notes.txt"}
+    assert predict(folder, "--reynolds", "130", "--fields", *here) == 0
+    assert there() == {"prediction.h5", "fields/re-130.h5", "fields/notes.txt"}
+    assert not (tmp_path / "tracers").exists()
+    assert predict(folder, "--reynolds", "130", *here) == 0
+    assert there() == {"prediction.h5", "fields/notes.txt"}
+
+
 def test_a_sweep_from_one_line(folder, tmp_path, capsys):
     results = tmp_path / "p.json"
     assert predict(folder, "--reynolds", "110", "100:250:7", "--out", str(tmp_path),
