@@ -49,6 +49,17 @@ class VerletList(eqx.Module):
         particle = jnp.argmax(squared)
         return jnp.sqrt(squared[particle]), particle
 
+    def closest(self, box: Box, position: Array) -> tuple[Array, Array]:
+        """The least distance [m] between two neighbours, and one of the two."""
+        here = self.sort(lax.stop_gradient(position)).T
+        # axis by axis, so that no array of all pairs is made
+        apart = (box.minimum_image(x[self.index] - x[:, None], k) for k, x in enumerate(here))
+        squared = sum(along * along for along in apart)
+        free = self.index == jnp.arange(here.shape[1], dtype=self.index.dtype)[:, None]
+        nearest = jnp.min(jnp.where(free, jnp.inf, squared), axis=1)
+        row = jnp.argmin(nearest)
+        return jnp.sqrt(nearest[row]), self.order[row]
+
     @property
     def overflow(self) -> Array:
         """Whether a row or a run of cells had more than fits; the list is then not usable."""
@@ -117,7 +128,7 @@ class NeighborSearch(eqx.Module):
 
     @partial(eqx.filter_jit, inline=True)
     def build(self, position: Float[Array, "particles dim"]) -> VerletList:
-        """The list of all neighbours within support + skin of each particle, in jit or out of it."""
+        """All neighbours within support + skin of each particle, in jit or out of it."""
         position = lax.stop_gradient(position)
         points, words, largest = self._flag(position)
         longest = longest_run(self.grid, points, points)

@@ -109,7 +109,7 @@ class Study:
             velocity_median_percent=float(np.median(percent[0][judged])),
             pressure_peak_percent=float(percent[1][judged].max()),
             pressure_median_percent=float(np.median(percent[1][judged])),
-            stable=fault is None,
+            stable=fault is None and "doubt" not in run.told,
             fom_seconds=full.timing.seconds(scene.steps),
             fom_steps=scene.steps,
             rom_steps=scene.steps if fault is None else fault.step,
