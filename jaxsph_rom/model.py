@@ -192,7 +192,10 @@ class ReducedModel(Model):
 
     def rates(self, time, state, auxiliary):
         modes, centre = self.basis_at(state.position)
-        stacked = (centre + modes @ state.coordinates).reshape(-1)
+        inverse = self.pseudo_inverse(modes)
+        resolved = inverse.expand(state.coordinates).reshape(modes.shape[:2])
+        # a border for the compiler, which else lays the modes out as the sums over pairs want it
+        stacked = lax.optimization_barrier((centre + resolved).reshape(-1))
 
         def full_rates(stacked):
             return self.stacked_rates(
@@ -201,7 +204,7 @@ class ReducedModel(Model):
 
         rates, transport = full_rates(stacked)
         coordinates = self.projection.reduce(
-            self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates
+            inverse, lambda w: full_rates(w)[0], stacked, rates
         )
         return ReducedState(coordinates, transport)
 
