@@ -5,14 +5,16 @@
 
 The Taylor-Green vortex at a Reynolds number that nothing was trained on, from a lattice or packed
 particles, or the lid-driven cavity, in either scheme, by either projection. Errors are those over
-the reference points, the pressure's mean and what is left of it apart; a run whose pressure is off
-by its own range, or whose particles clump, is named. Beside them stand the floors, which is what
-the modes make of the full run. Runs are kept in a folder and finished rows in the JSON file: the
-same command goes on.
+the reference points, the pressure's mean and what is left of it apart, and on the centre line; a
+run that was named as it went, whose pressure is off by its own range, or whose particles clump, is
+named. Beside them stand the floors, which is what the modes make of the full run, the full model's
+own sound, which is its pressure less its low-pass, and the errors of low-passed pressures. Runs are
+kept in a folder and finished rows in the JSON file: the same command goes on.
 """
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +36,15 @@ from jaxsph_rom import (
     LocalSplines,
     OnParticles,
     Study,
+    low_pass,
 )
 from jaxsph_rom.study import doubt, level_and_fluctuation
 
-from .measure import format_rows, number, progress, tell
+from .measure import format_rows, number, progress
 from .table import Table, command
 
 INTERPOLATIONS = {"splines": LocalSplines, "polynomials": LatticePolynomials}
-KEY = ("scheme", "arrangement", "modes", "projection")
+KEY = ("scheme", "arrangement", "interpolation", "reynolds", "modes", "projection")
 MODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 30, 40, 50)
 PROJECTIONS = {"galerkin": Galerkin(), "apg": AdjointPetrovGalerkin(1e-4)}
 
@@ -55,15 +58,18 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--scene", choices=("taylor-green", "lid-driven-cavity"), default="taylor-green",
         help="default: %(default)s")  # fmt: skip
-    add("--interpolation", choices=tuple(INTERPOLATIONS), default="splines",
-        help="of modes at moving particles (default: %(default)s)")  # fmt: skip
+    add("--interpolation", choices=tuple(INTERPOLATIONS),
+        help="of modes at moving particles (default: polynomials on a lattice, else splines)")
+    add("--cutoff", type=positive_float, metavar="HZ",
+        help="of the low-pass (default: the slowest sound's c0 / 2 L)")  # fmt: skip
     add("--judged-from", type=float, default=0.0, metavar="T",
         help="time from which on errors count [s] (default: 0)")  # fmt: skip
     add("--resolution", type=positive_int, default=50, metavar="N", help="default: %(default)s")
     add("--end-time", type=positive_float, default=1.0, metavar="T", help="[s] (default: 1)")
     add("--train", type=positive_float, nargs="+", default=[110.0, 160.0, 230.0], metavar="RE",
         help="default: 110 160 230")  # fmt: skip
-    add("--reynolds", type=positive_float, default=137.0, metavar="RE", help="default: 137")
+    add("--reynolds", type=positive_float, nargs="+", default=[137.0], metavar="RE",
+        help="default: 137")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", default=list(MODES), metavar="M",
         help=f"default: {' '.join(map(str, MODES))}")  # fmt: skip
     add("--schemes", choices=tuple(SCHEMES), nargs="+", default=["consistent"],
@@ -77,33 +83,27 @@ def _arguments(add) -> None:
 
 
 def _run(options) -> None:
-    names = ("scene", "interpolation", "judged_from", "resolution", "end_time", "train",
-             "reynolds")  # fmt: skip
+    names = ("scene", "judged_from", "resolution", "end_time", "train", "cutoff")
     kept = Table(options.json, KEY, settings={name: getattr(options, name) for name in names})
     kept.results |= {"environment": environment(), "device": jax.devices()[0].device_kind}
-    for scheme in options.schemes:
-        for arrangement in options.arrangements:
-            truth = None
-            for modes in options.modes:
-                left = [
-                    name
-                    for name in options.projections
-                    if not kept.has((scheme, arrangement, modes, name))
-                ]
-                if not left:
-                    tell(f"done before: {scheme}, {arrangement}, M = {modes}")
-                    continue
-                study = _study(options, scheme, arrangement, left)
-                experiment = Experiment(tuple(options.train), (options.reynolds,), (modes,))
-                for outcome in study.run(experiment):
-                    truth = truth or _Truth(study, experiment, options.judged_from)
-                    case = {"scheme": scheme, "arrangement": arrangement, "modes": modes,
-                            "projection": outcome.case.projection}  # fmt: skip
-                    kept.add(case | truth.row(outcome, modes))
+    for scheme, arrangement in product(options.schemes, options.arrangements):
+        usual = "polynomials" if arrangement == "lattice" else "splines"
+        made = {"scheme": scheme, "arrangement": arrangement,
+                "interpolation": options.interpolation or usual}  # fmt: skip
+        for name, reynolds in product(options.projections, options.reynolds):
+            case = made | {"reynolds": reynolds, "projection": name}
+            left = [each["modes"] for each in kept.left(case | {"modes": m} for m in options.modes)]
+            if not left:
+                continue
+            study, truth = _study(options, **made, name=name), None
+            experiment = Experiment(tuple(options.train), (reynolds,), tuple(left))
+            for outcome in study.run(experiment):
+                truth = truth or _Truth(study, experiment, options)
+                kept.add(case | {"modes": outcome.case.modes} | truth.row(outcome))
     print(_table(kept.rows))
 
 
-def _study(options, scheme: str, arrangement: str, names: list[str]) -> Study:
+def _study(options, scheme: str, arrangement: str, interpolation: str, name: str) -> Study:
     folder = options.out or Path("out", f"particle-modes-{options.scene}-{options.resolution}")
 
     def make(reynolds: float):
@@ -116,83 +116,100 @@ def _study(options, scheme: str, arrangement: str, names: list[str]) -> Study:
             dtype="float64",
         )
 
-    method = OnParticles(
-        tuple(PROJECTIONS[name] for name in names),
-        interpolation=INTERPOLATIONS[options.interpolation],
-    )
+    method = OnParticles((PROJECTIONS[name],), interpolation=INTERPOLATIONS[interpolation])
     return Study(make, folder / f"{scheme}-{arrangement}", method, progress=progress)
 
 
 class _Truth:
-    """The full run on the reference points."""
+    """The full run on the reference points and on the centre line."""
 
-    def __init__(self, study: Study, experiment: Experiment, judged_from: float):
-        (self.reynolds,) = experiment.reynolds
+    def __init__(self, study: Study, experiment: Experiment, options):
+        (reynolds,) = experiment.reynolds
         runs, (method,) = study.runs, study.methods
-        self.scene, self.full = runs.scene(self.reynolds), runs.full(self.reynolds)
+        self.scene, self.full = runs.scene(reynolds), runs.full(reynolds)
         self.reference = runs.reference(experiment.trained_on[0], method.rule)
         self.basis = method.basis(runs, experiment)
-        self.snapshots = self.reference.snapshots(self.full)
-        self.counted = self.full.time >= judged_from
+        self.snapshots = runs.mapped(reynolds, experiment.trained_on[0], method.rule)
+        self.line = runs.profile(reynolds)
+        self.counted = self.full.time >= options.judged_from
+        box, fluid = self.scene.space.box, self.scene.fluid
+        self.cutoff = options.cutoff or float(fluid.sound_speed) / (2.0 * max(box.lengths))
 
-    def row(self, outcome, modes: int) -> dict[str, Any]:
+    def row(self, outcome) -> dict[str, Any]:
         """Errors of a run and of the projection of the full one, and what it cost."""
         run: Trajectory = outcome.trajectory
-        found = self.reference.snapshots(run)
-        basis = self.basis.truncated(modes)
-        centred = self.snapshots - basis.centre[:, :, None]
+        found, count = self.reference.snapshots(run), len(run.time)
+        basis = self.basis.truncated(outcome.case.modes)
+        centred = self.snapshots[:, :, :count] - basis.centre[:, :, None]
         weighted = basis.modes * basis.weights[None, :, None]
         coordinates = np.einsum("gfm,gft->mt", weighted, centred)
         floor = np.einsum("gfm,mt->gft", basis.modes, coordinates) + basis.centre[:, :, None]
-        errors = self._errors(found, "") | self._errors(floor[:, :, : len(run.time)], "floor_")
-        fluctuation = level_and_fluctuation(*self._pressures(found))[1]
-        counted, case = self.counted[: len(run.time)], outcome.case
+        wanted = self._fields(self.snapshots[:, :, :count])
+        line = tuple(values[:count] for values in self.line)
+        errors = self._errors(wanted, self._fields(found), "")
+        errors |= self._errors(wanted, self._fields(floor), "floor_")
+        errors |= self._errors(line, outcome.profile, "line_")
+        fluctuation = level_and_fluctuation(wanted[1], self._fields(found)[1])[1]
+        counted, case = self.counted[:count], outcome.case
         return errors | {
             "stable": case.stable,
             "fault": case.fault,
-            "doubt": doubt(run, self.scene, run.time[counted], fluctuation[counted]),
+            "doubt": case.doubt,
+            "judged": doubt(run, self.scene, run.time[counted], fluctuation[counted]),
             "seconds_per_step": case.rom_seconds and case.rom_seconds / case.rom_steps,
             "full_seconds_per_step": case.fom_seconds / case.fom_steps,
         }
 
-    def _pressures(self, found) -> list[np.ndarray]:
-        count = found.shape[2]
-        fields = (self.snapshots[:, 0, :count], found[:, 0])
-        return [np.asarray(self.scene.fluid.pressure(jnp.asarray(density.T))) for density in fields]
+    def _fields(self, snapshots) -> tuple[np.ndarray, np.ndarray]:
+        """Speed and pressure, (times, points) each."""
+        pressure = self.scene.fluid.pressure(jnp.asarray(snapshots[:, 0].T))
+        return np.linalg.norm(snapshots[:, 1:], axis=1).T, np.asarray(pressure)
 
-    def _errors(self, found, prefix: str) -> dict[str, float]:
-        speeds = [
-            np.linalg.norm(fields[:, 1:, : found.shape[2]], axis=1).T
-            for fields in (self.snapshots, found)
-        ]
-        pressures = self._pressures(found)
-        level, fluctuation = level_and_fluctuation(*pressures)
+    def _errors(self, wanted, found, prefix: str) -> dict[str, float | None]:
+        level, fluctuation = level_and_fluctuation(wanted[1], found[1])
+        slow = [self._slow(pressure) for pressure in (wanted[1], found[1])]
         parts = {
-            "velocity": relative_discrepancy(*speeds),
-            "pressure": relative_discrepancy(*pressures),
+            "velocity": relative_discrepancy(wanted[0], found[0]),
+            "pressure": relative_discrepancy(wanted[1], found[1]),
             "level": level,
             "fluctuation": fluctuation,
+            "slow_pressure": None if slow[0] is None else relative_discrepancy(*slow),
+            "sound": None if slow[0] is None else relative_discrepancy(wanted[1], slow[0]),
         }
+        if prefix == "floor_":
+            del parts["sound"]
         return {
-            f"{prefix}{name}_{what}_percent": float(of(percent[self.counted[: len(percent)]]))
+            f"{prefix}{name}_{what}_percent": None
+            if percent is None
+            else float(of(percent[self.counted[: len(percent)]]))
             for name, percent in parts.items()
             for what, of in (("peak", np.max), ("median", np.median))
         }
 
+    def _slow(self, pressure: np.ndarray) -> np.ndarray | None:
+        """Without what is faster than the cutoff; None of a run too short for the filter."""
+        time = self.full.time[: len(pressure)]
+        try:
+            return low_pass(pressure.T[:, None, :], time, self.cutoff)[:, 0].T
+        except ValueError:
+            return None
+
 
 def _table(rows: list[dict[str, Any]]) -> str:
     names = ("velocity_peak", "velocity_median", "pressure_peak", "pressure_median",
-             "floor_pressure_median", "level_peak", "fluctuation_peak")  # fmt: skip
-    header = ("scheme", "start", "M", "projection", "u %", "median", "p %", "median", "floor",
-              "level %", "rest %", "steps", "stable", "doubt")  # fmt: skip
+             "floor_pressure_median", "level_peak", "fluctuation_peak", "slow_pressure_peak",
+             "sound_peak")  # fmt: skip
+    header = ("scheme", "start", "Re", "M", "projection", "u %", "median", "p %", "median", "floor",
+              "level %", "rest %", "slow p %", "sound %", "steps", "stable", "doubt")  # fmt: skip
     lines = []
     for row in rows:
         cost = row["seconds_per_step"]
         lines.append((
-            row["scheme"], row["arrangement"], str(row["modes"]), row["projection"],
-            *(number(row[f"{name}_percent"]) for name in names),
+            row["scheme"], row["arrangement"], f"{row['reynolds']:g}", str(row["modes"]),
+            row["projection"],
+            *(number(row.get(f"{name}_percent")) for name in names),
             number(None if cost is None else cost / row["full_seconds_per_step"]),
-            "yes" if row["stable"] else "no", row["doubt"] or "none",
+            "yes" if row["stable"] else "no", row.get("doubt") or row["judged"] or "none",
         ))  # fmt: skip
     return "errors over the reference points; steps: cost of a step over a full model's\n" + (
         format_rows(header, lines)

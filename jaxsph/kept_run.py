@@ -13,7 +13,7 @@ import jax
 from .content import content
 from .integrate import Model
 from .io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
-from .simulate import simulate
+from .simulate import first_doubt, simulate
 from .trajectory import Trajectory
 
 
@@ -50,12 +50,15 @@ def kept_run(
     if done == scene.steps:
         return _whole(path, scene)
     made = model()
+    metadata = {"scene": scene.name, "parameters": scene.parameters}
     if done:
         begun, writer = read_trajectory(path), TrajectoryWriter.append_to(path)
         if writer.last_step != begun.metadata["steps"]:
             writer.close()
             raise _disturbed(path)
         state = restore(begun)
+        if options.get("watch") is not None:
+            metadata |= first_doubt(options["watch"], begun)
     else:
         state = start(made)
         coordinates = jax.eval_shape(made.observe, state).coordinates
@@ -76,7 +79,7 @@ def kept_run(
             first_step=done or 0,
             recorder=writer,
             progress=report,
-            metadata={"scene": scene.name, "parameters": scene.parameters},
+            metadata=metadata,
             **options,
         )
         writer.finish(part.metadata)

@@ -38,6 +38,7 @@ class Recorder(Protocol):
     def append(self, step: int, time: float, snapshot: Snapshot) -> None: ...
 
 
+Watch = Callable[[float, Snapshot], str | None]
 Measure = Callable[[Any, jax.Array, Any], tuple[dict[str, jax.Array], dict[str, jax.Array]]]
 
 
@@ -58,6 +59,7 @@ def simulate(
     metadata: dict | None = None,
     stepping: Stepping = FixedSteps(),  # noqa: B008
     measure: Measure | None = None,
+    watch: Watch | None = None,
 ) -> Trajectory:
     """Integrate a model and return its snapshots, the first being the state given.
 
@@ -78,6 +80,9 @@ def simulate(
             RK4, or another `Stepper` given to either.
         measure: model, time [s] and state of each snapshot -> forces and torques to go with it, by
             name: `jaxsph.WallForces.of(scene)`, say.
+        watch: time [s] and each new snapshot -> why it is not to be believed, if it is not. The
+            run goes on; the first such answer is a warning, and `doubt` in the metadata, with
+            `doubt_time` [s].
 
     Raises:
         ValueError: if no whole interval is left to run.
@@ -100,7 +105,7 @@ def simulate(
         )
     dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
     dt = jnp.asarray(time_step, dtype)
-    records, times = [], []
+    records, times, metadata = [], [], dict(metadata or {})
 
     def record(step, snapshot):
         if measure is not None:
@@ -115,6 +120,11 @@ def simulate(
         times.append(step * time_step)
         if recorder is not None:
             recorder.append(step, step * time_step, snapshot)
+        if watch is not None and "doubt" not in metadata:
+            found = doubt(watch, step * time_step, snapshot)
+            metadata.update(found)
+            if found:
+                warnings.warn("t = {doubt_time:.4g} s: {doubt}.".format(**found), stacklevel=3)
 
     def _failed(fault, likely=None):
         error = SimulationError(fault, time_step, likely)
@@ -135,7 +145,7 @@ def simulate(
             coordinates=stacked.coordinates,
             forces=stacked.forces,
             torques=stacked.torques,
-            metadata={**(metadata or {}), **took.metadata()},
+            metadata={**metadata, **took.metadata()},
         )
 
     compile_seconds, run_seconds, step = 0.0, 0.0, first_step
@@ -170,6 +180,21 @@ def simulate(
         if progress is not None:
             progress(each)
     return trajectory()
+
+
+def doubt(watch: Watch, time: float, snapshot: Snapshot) -> dict[str, Any]:
+    """Metadata of a run with that snapshot: `doubt`, `doubt_time` if it is not to be believed."""
+    why = watch(time, snapshot)
+    return {} if why is None else {"doubt": why, "doubt_time": time}
+
+
+def first_doubt(watch: Watch, trajectory: Trajectory) -> dict[str, Any]:
+    """The first `doubt` of a trajectory's snapshots, as in metadata; empty if there is none."""
+    for number, time in enumerate(trajectory.time):
+        found = doubt(watch, float(time), trajectory.snapshot(number))
+        if found:
+            return found
+    return {}
 
 
 def _lost(snapshot: Snapshot) -> int | None:

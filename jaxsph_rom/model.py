@@ -29,6 +29,7 @@ from .projection import Projection, PseudoInverse
 from .still_walls import check_still
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
+CLUMPED = 0.1  # times dx: evenly spread particles are 0.5 to 1 apart
 
 
 class ReducedState(eqx.Module):
@@ -44,8 +45,8 @@ class ReducedModel(Model):
         d(w^)/dt = projection of f-bar(centre + Phi~(x) w^),    dx/dt = u~ + du~.
 
     As modes do not keep particles inside walls, those that come too near are put back after each
-    step. It runs in the full model's loop. At every stage the modes are carried to the particles,
-    so its cost is that of a full right-hand side and more.
+    step; particles that clump are a fault. It runs in the full model's loop. At every stage the
+    modes are carried to the particles, so its cost is that of a full right-hand side and more.
 
     Args:
         functional: what of f-bar the effects make.
@@ -191,7 +192,10 @@ class ReducedModel(Model):
 
     def rates(self, time, state, auxiliary):
         modes, centre = self.basis_at(state.position)
-        stacked = (centre + modes @ state.coordinates).reshape(-1)
+        inverse = self.pseudo_inverse(modes)
+        resolved = inverse.expand(state.coordinates).reshape(modes.shape[:2])
+        # a border for the compiler, which else lays the modes out as the sums over pairs want it
+        stacked = lax.optimization_barrier((centre + resolved).reshape(-1))
 
         def full_rates(stacked):
             return self.stacked_rates(
@@ -200,7 +204,7 @@ class ReducedModel(Model):
 
         rates, transport = full_rates(stacked)
         coordinates = self.projection.reduce(
-            self.pseudo_inverse(modes), lambda w: full_rates(w)[0], stacked, rates
+            inverse, lambda w: full_rates(w)[0], stacked, rates
         )
         return ReducedState(coordinates, transport)
 
@@ -218,12 +222,15 @@ class ReducedModel(Model):
         density = self.basis.centre[:, 0] + self.basis.modes[:, 0, :] @ coordinates
         ratio = lax.stop_gradient(density / self.functional.fluid.reference_density)
         out = (ratio < DENSITY_BOUNDS[0]) | (ratio > DENSITY_BOUNDS[1])
+        space = self.functional.space
+        apart, nearest = auxiliary.closest(space.box, position)
         return Fault.first_of(
             step,
             (FaultCode.NOT_FINITE, lost, -1),
             (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
             (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), -1),
             *wall_checks(self.functional.walls, position),
+            (FaultCode.CLUMPED, apart < CLUMPED * space.spacing, nearest),
             *list_checks(self.search, auxiliary, position),
             (FaultCode.SPLINE_CELL_OVERFLOW, self.interpolation.overflow(position), -1),
         )

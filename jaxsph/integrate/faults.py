@@ -21,6 +21,7 @@ class FaultCode(IntEnum):
     BEYOND_WALL = 6
     ENERGY_OUT_OF_BOUNDS = 7
     STEPS_EXHAUSTED = 8
+    CLUMPED = 9
 
 
 # what it means, and what to do where nothing more is known
@@ -58,6 +59,11 @@ _EXPLANATIONS = {
     FaultCode.STEPS_EXHAUSTED: (
         "the automatic steps became so short that an interval did not end",
         "allow more of them, or look at what moves so fast in the last snapshot",
+    ),
+    FaultCode.CLUMPED: (
+        "particles have clumped: two are nearer to one another than a tenth of their spacing",
+        "use the consistent scheme, the modes' own advection, a map that keeps quadratic fields or "
+        "other modes",
     ),
 }
 

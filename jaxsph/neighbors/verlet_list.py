@@ -49,6 +49,17 @@ class VerletList(eqx.Module):
         particle = jnp.argmax(squared)
         return jnp.sqrt(squared[particle]), particle
 
+    def closest(self, box: Box, position: Array) -> tuple[Array, Array]:
+        """The least distance [m] between two neighbours, and one of the two."""
+        here = self.sort(lax.stop_gradient(position)).T
+        # axis by axis, so that no array of all pairs is made
+        apart = (box.minimum_image(x[self.index] - x[:, None], k) for k, x in enumerate(here))
+        squared = sum(along * along for along in apart)
+        free = self.index == jnp.arange(here.shape[1], dtype=self.index.dtype)[:, None]
+        nearest = jnp.min(jnp.where(free, jnp.inf, squared), axis=1)
+        row = jnp.argmin(nearest)
+        return jnp.sqrt(nearest[row]), self.order[row]
+
     @property
     def overflow(self) -> Array:
         """Whether a row or a run of cells had more than fits; the list is then not usable."""

@@ -76,6 +76,10 @@ class WallList(eqx.Module):
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         return self.fluid.largest_motion(box, position)
 
+    def closest(self, box: Box, position: Array) -> tuple[Array, Array]:
+        """The least distance [m] between two particles of the fluid, and one of the two."""
+        return self.fluid.closest(box, position)
+
     @property
     def reference(self) -> Float[Array, "particles dim"]:
         return self.fluid.reference

@@ -15,25 +15,31 @@ class PseudoInverse(eqx.Module):
     """Phi^+ in a weighted inner product, by the Cholesky factor of the Gram matrix.
 
     At particle positions the interpolated basis is not orthonormal, so this is a real
-    least-squares solve.
+    least-squares solve. Of the basis only W^1/2 Phi is kept: whatever reads it reads it along its
+    rows, so that a compiler makes it once and as it lies.
     """
 
-    basis: Float[Array, "states modes"]
-    weighted: Float[Array, "states modes"]
+    scaled: Float[Array, "states modes"]
+    root: Float[Array, " states"]
     factor: Float[Array, "modes modes"]
 
     def __init__(self, basis: Float[Array, "states modes"], weights: Float[Array, " states"]):
-        self.basis = basis
-        self.weighted = basis * weights[:, None]
-        self.factor = jnp.linalg.cholesky(basis.T @ self.weighted)
+        self.root = jnp.sqrt(weights)
+        self.scaled = basis * self.root[:, None]
+        self.factor = jnp.linalg.cholesky(self.scaled.T @ self.scaled)
 
     def __call__(self, vector: Float[Array, " states"]) -> Float[Array, " modes"]:
         """Phi^+ v: the coordinates nearest to v."""
-        return jax.scipy.linalg.cho_solve((self.factor, True), self.weighted.T @ vector)
+        right = (self.root * vector) @ self.scaled
+        return jax.scipy.linalg.cho_solve((self.factor, True), right)
+
+    def expand(self, coordinates: Float[Array, " modes"]) -> Float[Array, " states"]:
+        """Phi a."""
+        return (self.scaled @ coordinates) / self.root
 
     def complement(self, vector: Float[Array, " states"]) -> Float[Array, " states"]:
         """Pi' v = v - Phi Phi^+ v."""
-        return vector - self.basis @ self(vector)
+        return vector - self.expand(self(vector))
 
 
 class Projection(eqx.Module):

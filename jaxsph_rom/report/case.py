@@ -28,7 +28,7 @@ class Case:
         velocity_peak_percent, velocity_median_percent: relative discrepancy of the velocity norm,
             largest and median over time [%].
         pressure_peak_percent, pressure_median_percent: the same of the pressure [%].
-        stable: whether the run reached its end with bounded fields.
+        stable: whether the run reached its end with bounded fields and nothing to doubt.
         fom_seconds, rom_seconds: wall-clock time of the full and the reduced run without
             compilation [s].
         fom_steps, rom_steps: number of time steps in them.
@@ -40,6 +40,8 @@ class Case:
             included [s].
         fault: why it is unstable, or None.
         fault_time: simulated time at which it failed [s], or None.
+        doubt: why it is not to be believed though it went on, or None.
+        doubt_time: simulated time from which on that is so [s], or None.
     """
 
     scene: str
@@ -67,6 +69,8 @@ class Case:
     offline_seconds: float | None = None
     fault: str | None = None
     fault_time: float | None = None
+    doubt: str | None = None
+    doubt_time: float | None = None
 
     @property
     def sound(self) -> bool:

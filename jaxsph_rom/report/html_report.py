@@ -12,7 +12,7 @@ from jaxsph.report import page
 from jaxsph.report.settings import environment_rows, parameter_rows
 
 from .case import Case
-from .table import COLUMNS, cells, fault, heading
+from .table import COLUMNS, cells, heading, wrong
 from .verdict import verdict
 
 FILE_NAME = "report.html"
@@ -49,8 +49,8 @@ def write_html_report(
     numbers = [column[2] == ">" for column in COLUMNS]
     for name, group in itertools.groupby(cases, key=heading):
         pieces += [page.paragraph(name), page.table(_NAMES, map(cells, group), numbers)]
-    pieces += [page.paragraph(text) for text in dict.fromkeys(fault(c) for c in cases if c.fault)]
-    pieces += [page.paragraph(text) for text in verdict(cases)]
+    pieces += map(page.paragraph, wrong(cases))
+    pieces += map(page.paragraph, verdict(cases))
     pieces.append(
         page.paragraph(
             "Percent relative discrepancy from the full model, peak and median over time; run "

@@ -39,7 +39,7 @@ def format_table(cases: Sequence[Case]) -> str:
     Every row holds the errors (percent relative discrepancy, peak and median over time) and the
     times (wall clock without compilation) of one case, so that neither is read without the other.
     A line names the scene, the inner product and the hyper-reduction where they change. What
-    made a run unstable stands below the table.
+    made a run unstable or doubtful stands below the table.
 
     Args:
         cases: the cases to show.
@@ -68,7 +68,7 @@ def format_table(cases: Sequence[Case]) -> str:
     rows = zip(cases, body, strict=True)
     for name, group in itertools.groupby(rows, key=lambda row: heading(row[0])):
         lines += [*textwrap.wrap(name, WIDTH), *(line(texts) for _, texts in group)]
-    for text in dict.fromkeys(fault(case) for case in cases if case.fault):
+    for text in wrong(cases):
         lines += textwrap.wrap(text, WIDTH, subsequent_indent="    ")
     return "\n".join(lines)
 
@@ -115,9 +115,9 @@ def _short(text: str) -> str:
 def _verdict(case: Case) -> str:
     if case.sound:
         return "yes"
-    if case.fault_time is None or not math.isfinite(case.fault_time):
-        return "unstable"
-    return f"unstable, {case.fault_time:.3g} s"
+    doubtful = case.doubt is not None and case.fault is None
+    word, time = ("doubtful", case.doubt_time) if doubtful else ("unstable", case.fault_time)
+    return word if time is None or not math.isfinite(time) else f"{word}, {time:.3g} s"
 
 
 def heading(case: Case) -> str:
@@ -125,6 +125,12 @@ def heading(case: Case) -> str:
     return f"{case.scene}: {case.inner_product} inner product, hyper-reduction {case.hyper}"
 
 
-def fault(case: Case) -> str:
-    """What made a case unstable."""
-    return f"Re {case.reynolds:g}, M {case.modes}, {case.projection}: {case.fault}"
+def wrong(cases: Sequence[Case]) -> list[str]:
+    """What made cases unstable or doubtful, each once."""
+    said = [(case, text) for case in cases for text in (case.doubt, case.fault) if text]
+    return list(
+        dict.fromkeys(
+            f"Re {case.reynolds:g}, M {case.modes}, {case.projection}: {text}"
+            for case, text in said
+        )
+    )

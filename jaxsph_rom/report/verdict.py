@@ -62,7 +62,7 @@ def _sentence(model: Sequence[Case]) -> str:
     told = f"{_name(model[0])}, M = {model[0].modes}, at Re {numbers}: "
     if not _sound(model):
         failed = ", ".join(f"{case.reynolds:g}" for case in judged if not case.sound)
-        return f"{told}no whole run at Re {failed}."
+        return f"{told}no sound run at Re {failed}."
     errors = [
         f"{name} within {_worst(model, f'{name}_peak'):.2g} % "
         f"({_worst(model, f'{name}_median'):.2g} % in the median over time)"

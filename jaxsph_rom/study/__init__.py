@@ -17,4 +17,5 @@ from .soundness import doubt as doubt
 from .soundness import level_and_fluctuation as level_and_fluctuation
 from .study import Outcome as Outcome
 from .study import Study as Study
+from .watch import TrainedPressure as TrainedPressure
 from .write import write_study as write_study

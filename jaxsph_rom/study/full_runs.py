@@ -44,7 +44,7 @@ class FullRuns:
         self._probes = _centre_line if probes is None else probes
         self.full = cache(self._full)
         self.profile = cache(self._profile)
-        self._snapshots = cache(self._mapped)
+        self.mapped = cache(self._mapped)
 
     def _full(self, reynolds: float) -> Trajectory:
         return full_run(self.folder / "full", self.scene(reynolds), self.progress)
@@ -83,7 +83,7 @@ class FullRuns:
     ) -> Basis:
         """POD basis of some runs on the reference space of the first."""
         first = trained_on[0]
-        matrices = [self._snapshots(reynolds, first, rule) for reynolds in trained_on]
+        matrices = [self.mapped(reynolds, first, rule) for reynolds in trained_on]
         return self._pod(matrices, trained_on, product, centring, modes)
 
     def lagrangian_basis(

@@ -17,6 +17,7 @@ from jaxsph.interpolation import KernelMap, QuadraticMap, ShepardMap
 from jaxsph.io import read_trajectory
 from jaxsph.kept_run import kept_run
 from jaxsph.metrics import probe
+from jaxsph.simulate import first_doubt
 
 from ..basis import Basis, Centring, Energy, Euclidean, InnerProduct
 from ..field_advection import Advection, ModeAdvection, PaperAdvection
@@ -27,6 +28,7 @@ from ..splines import LocalSplines
 from .full_runs import FullRuns
 from .method import Experiment, Method, ModelBasis, ReducedRun
 from .recorded_run import with_record
+from .watch import TrainedPressure
 
 
 @final
@@ -112,6 +114,9 @@ class OnParticles(Method):
     def _reduced(self, runs, trained_on, reynolds, basis, interpolation, projection):
         """Trajectory, profile, fault and what else there is to tell of a run."""
         scene = runs.scene(reynolds)
+        first = trained_on[0]
+        trained = ((runs.full(r).time, runs.mapped(r, first, self.rule)) for r in trained_on)
+        watch = TrainedPressure.of(basis, scene.fluid, trained)
         rule = projection if isinstance(projection, MemoryLength) else None
         if rule is not None:
             projection = self._petrov_galerkin(rule, scene, basis, interpolation)
@@ -133,8 +138,8 @@ class OnParticles(Method):
                 jnp.asarray(trajectory.coordinates[-1]), jnp.asarray(trajectory.position[-1])
             )
 
-        trained = "-".join(f"{r:g}" for r in trained_on)
-        path = runs.folder / "reduced" / f"{self._label}-{trained}" / f"re-{reynolds:g}"
+        numbers = "-".join(f"{r:g}" for r in trained_on)
+        path = runs.folder / "reduced" / f"{self._label}-{numbers}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
         label = f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}"
         fault = None
@@ -153,10 +158,11 @@ class OnParticles(Method):
                     "method": dataclasses.replace(self, projections=()),
                     "projection": projection,
                 },
+                watch=watch,
             )
         except SimulationError as error:
             fault, run = error, read_trajectory(path)
-        told |= {
+        told |= first_doubt(watch, run) | {
             "memory": None if rule is None else rule.label,
             "hyper": "none",
             "rom_seconds": run.timing.seconds(scene.steps) if fault is None else None,

@@ -10,8 +10,8 @@ from jaxsph import Box, Trajectory
 from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
-OFF = 100.0  # percent: a pressure that is off by its own range says nothing
-CLUMPED = 0.1  # times dx: evenly spread particles are 0.5 to 1 apart
+from ..model import CLUMPED
+from .watch import OFF
 
 
 def level_and_fluctuation(

@@ -112,7 +112,7 @@ class Study:
             velocity_median_percent=float(np.median(percent[0][judged])),
             pressure_peak_percent=float(percent[1][judged].max()),
             pressure_median_percent=float(np.median(percent[1][judged])),
-            stable=fault is None,
+            stable=fault is None and "doubt" not in run.told,
             fom_seconds=self.runs.seconds(run.reynolds),
             training_seconds=sum(map(self.runs.seconds, run.told["trained_on"])),
             fom_steps=scene.steps,

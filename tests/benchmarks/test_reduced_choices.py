@@ -77,8 +77,8 @@ def test_larger_steps(tmp_path, capsys, monkeypatch):
 @pytest.mark.slow
 def test_any_number_of_modes_on_particles_is_taken_up_again(tmp_path, capsys):
     path = tmp_path / "modes.json"
-    same = ["--resolution", "16", "--end-time", "0.05", "--arrangements", "lattice"]
-    same += ["--json", str(path)]
+    same = ["--resolution", "16", "--end-time", "0.34", "--arrangements", "lattice"]
+    same += ["--json", str(path), "--out", str(tmp_path)]
     assert particle_modes.main([*same, "--modes", "2"]) == 0
     first = results(path)["rows"]
     assert particle_modes.main([*same, "--modes", "2", "4", "--projections", "apg"]) == 0
@@ -87,8 +87,11 @@ def test_any_number_of_modes_on_particles_is_taken_up_again(tmp_path, capsys):
     made = [(r["modes"], r["projection"]) for r in rows]
     assert made == [(2, "galerkin"), (2, "apg"), (4, "apg")]
     for row in rows:
-        assert row["stable"] and row["doubt"] is None
+        assert row["stable"] and row["doubt"] is None and row["judged"] is None
+        assert row["interpolation"] == "polynomials"  # on a lattice
+        assert 0 < row["slow_pressure_peak_percent"] < row["pressure_peak_percent"]
+        assert row["sound_peak_percent"] > 0
         assert 0 < row["floor_velocity_peak_percent"] < 1.0 and row["velocity_peak_percent"] < 1.0
         assert 0 < row["level_peak_percent"] < row["fluctuation_peak_percent"] < 10.0
     assert "apg" in capsys.readouterr().out
-    assert particle_modes.main([*same, "--reynolds", "150"]) == 2
+    assert particle_modes.main([*same, "--cutoff", "3"]) == 2

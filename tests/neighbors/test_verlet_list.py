@@ -243,6 +243,26 @@ def test_largest_motion_is_measured_across_periodic_faces():
 @pytest.mark.parametrize("name", ["periodic", "cube"])
 @settings(max_examples=20)
 @given(seed=seeds)
+def test_the_closest_pair_is_that_of_all_pairs(name, seed):
+    box = BOXES[name]
+    position = particles(box, seed)
+    neighbors = build(roomy(box, COUNT), jnp.asarray(position))
+    apart = distances(box, position)
+    np.fill_diagonal(apart, np.inf)
+    distance, particle = neighbors.closest(box, jnp.asarray(position))
+    assert distance == pytest.approx(apart.min(), rel=1e-9)  # round-off
+    assert apart[particle].min() == apart.min()
+
+
+def test_one_particle_is_close_to_none():
+    box = BOXES["periodic"]
+    position = jnp.asarray([[0.5, 0.2]])
+    assert np.isinf(build(roomy(box, 1), position).closest(box, position)[0])
+
+
+@pytest.mark.parametrize("name", ["periodic", "cube"])
+@settings(max_examples=20)
+@given(seed=seeds)
 def test_list_stays_complete_while_no_one_moves_more_than_half_the_skin(name, seed):
     box = BOXES[name]
     position = particles(box, seed)

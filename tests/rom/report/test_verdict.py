@@ -42,7 +42,7 @@ def test_the_number_of_modes_that_errs_least_speaks_for_its_kind():
 
 def test_a_failed_run_is_named_and_nothing_is_said_that_was_not_measured():
     lost = on_points(125.0, velocity_peak_percent=math.nan), on_points(175.0)
-    assert verdict(lost)[0].endswith("at Re 125, 175: no whole run at Re 125.")
+    assert verdict(lost)[0].endswith("at Re 125, 175: no sound run at Re 125.")
     (text,) = verdict([on_points(125.0, offline_seconds=None)])
     assert "2,000 times faster" in text and "What making it took was not measured" in text
     assert "its time was not measured" in verdict([on_points(125.0, rom_seconds=None)])[0]
