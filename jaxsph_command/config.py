@@ -99,7 +99,8 @@ def _words(path: Path, command: str) -> list[str]:
         if isinstance(value, bool):
             words.append(option if value else option.replace("--", "--no-", 1))
         elif key == "set":
-            words += [f"{option}={item}" for item in value]
+            items = value if isinstance(value, list) else [value]
+            words += [f"{option}={item}" for item in items]
         elif isinstance(value, list):
             words += [option, *map(str, value)]
         elif isinstance(value, dict):

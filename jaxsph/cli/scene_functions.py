@@ -80,7 +80,7 @@ def made(make: Callable[..., Scene], settings: Mapping[str, Any]) -> Scene:
         scene = make(**settings)
     except ValueError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"scene: {_fault(error, make.__code__.co_filename)}") from None
     if not isinstance(scene, Scene):
         raise ValueError(
@@ -183,7 +183,7 @@ def _loaded(path: Path) -> ModuleType:
     sys.modules[path.stem] = module  # by which its classes are found
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"scene: {_fault(error, spec.origin)}") from None
     return module
 

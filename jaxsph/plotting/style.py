@@ -57,7 +57,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
 def check_ending(path: Path) -> None:
     """A ValueError if no figure can be written with a path's ending."""
     known = FigureCanvasBase.get_supported_filetypes()
-    if path.suffix.removeprefix(".") not in known:
+    if path.suffix.lower().removeprefix(".") not in known:
         raise ValueError(f"{path}: figures end with .png, .pdf or .svg; name it so.")
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from jaxsph.cli import ARRANGEMENTS, Parser, positive_float, reynolds_numbers
+from jaxsph.cli.options import MOST_NUMBERS
 from jaxsph.cli.scene_functions import made, unpacked
 from jaxsph.cli.scene_options import add_scene_options, scene_settings
 from jaxsph.progress import progress_bar
@@ -82,6 +83,8 @@ def named_numbers(text: str) -> tuple[str, tuple[float, ...]]:
         try:
             if part.count(":") == 2:
                 low, high, count = part.split(":")
+                if int(count) > MOST_NUMBERS:
+                    raise argparse.ArgumentTypeError(f"at most {MOST_NUMBERS} values, got {text}")
                 found += np.linspace(float(low), float(high), int(count)).tolist()
             else:
                 found.append(float(part))

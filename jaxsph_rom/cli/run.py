@@ -168,7 +168,8 @@ def _run(options) -> int:
 def _print_verdict(cases: list[Case], folder: Path, plan: Plan) -> None:
     """What the table comes to, and how to use the model that it speaks for."""
     for text in verdict(cases):
-        print("\n" + textwrap.fill(text, WIDTH))
+        whole = text.replace(" %", "\N{NO-BREAK SPACE}%")
+        print("\n" + textwrap.fill(whole, WIDTH).replace("\N{NO-BREAK SPACE}", " "))
     if (folder / MODEL).exists():
         told = best([case for case in cases if case.hyper != "none"])[0]
         print(f"\n{folder / MODEL} is the model on points with M = {told.modes}; run it by\n"

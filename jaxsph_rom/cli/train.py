@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,14 @@ import jax
 
 from jaxsph import Trajectory
 from jaxsph.cli import Parser, fail, positive_int, print_rows
-from jaxsph.cli.options import add_json_option, bytes_in, bytes_told, result_file, write_json
+from jaxsph.cli.options import (
+    MOST_NUMBERS,
+    add_json_option,
+    bytes_in,
+    bytes_told,
+    result_file,
+    write_json,
+)
 from jaxsph.cli.scene_functions import name_of
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
@@ -122,6 +130,9 @@ def _train(options) -> int:
 
 def _points(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
     """All combinations, from the largest values on."""
+    count = math.prod(map(len, values.values()))
+    if count > MOST_NUMBERS:
+        raise ValueError(f"--train: {count} combinations; give at most {MOST_NUMBERS} a call.")
     ordered = [sorted(of, reverse=True) for of in values.values()]
     return [dict(zip(values, point, strict=True)) for point in product(*ordered)]
 

@@ -78,8 +78,8 @@ def _sentence(model: Sequence[Case]) -> str:
 
 def _name(case: Case) -> str:
     if case.hyper == "none":
-        return f"on moving particles, {case.projection}"
-    return f"on points, {case.hyper}"
+        return f"On moving particles, {case.projection}"
+    return f"On points, {case.hyper}"
 
 
 def _paid(model: Sequence[Case]) -> str:

@@ -25,6 +25,9 @@ def fails(amplitude=1.0):
 
 def nothing(amplitude=1.0):
     return None
+
+def stops(amplitude=1.0):
+    raise SystemExit(3)
 """
 RUN = "run taylor-green --resolution 16 --arrangement lattice --t-end 0.02"
 TRAIN = "train taylor-green --resolution 16 --arrangement lattice --t-end 0.04 --modes 2"
@@ -48,9 +51,11 @@ FULL = {
     "run broken.py": "broken.py, line 2: ZeroDivisionError",
     "run wrong.py": "wrong.py, line 1: SyntaxError",
     "run folder.py": "there is no file folder.py",
-    "run scenes.py": "it has drop, fails, nothing",
+    "run scenes.py": "it has drop, fails, nothing, stops",
     "run scenes.py:dorp": "did you mean drop?",
     "run scenes.py:fails": "KeyError",
+    "run scenes.py:stops": "scenes.py, line 15: SystemExit: 3",
+    "run stops.py": "stops.py, line 2: SystemExit: 4",
     "run scenes.py:nothing": "let it return a jaxsph Scene",
     "run --resolution 16 scenes.py:drop --amplitude x": "--amplitude",
     # run: its settings
@@ -103,6 +108,9 @@ FULL = {
     f"{RUN} --config sweep.toml": "is of the command sweep, not of run",
     "run --config table.toml": "scene",
     "run --config unknown.toml": "--colour",
+    "run --config set.toml": "--set: give NAME=VALUE, got 5",
+    "run --config flag.toml": "--overwrite: ignored explicit argument 'yes'",
+    "run --config folder": "folder cannot be read (Is a directory)",
     "run --config": "--config: expected one argument",
     "run taylor-green --resume missing.h5": "no such file",
     "run taylor-green --resume text": "not an HDF5 file",
@@ -174,6 +182,8 @@ REDUCED = {
     "train scenes.py:drop --train amplitude=0.1 --amplitude 0.2": "amplitude is given as a setting",
     "train scenes.py:drop --train ampiltude=0.1,0.2": "did you mean amplitude?",
     # predict
+    "train scenes.py:drop --train amplitude=0:1:1000000000": "--train: at most 100000 values",
+    "train scenes.py:drop --train amplitude=0:1:9999 resolution=1:99999:9999": "99980001",
     "predict": "FILE",
     "predict missing.h5 --reynolds 100": "missing.h5: cannot be read",
     "predict text --reynolds 100": "is not an HDF5 file",
@@ -224,6 +234,9 @@ def folder(tmp_path_factory):
     (folder / "wrong.py").write_text("def (:\n")
     (folder / "sweep.toml").write_text('command = "sweep"\nscene = "taylor-green"\n')
     (folder / "table.toml").write_text("[scene]\nname = 1\n")
+    (folder / "stops.py").write_text("import sys\nsys.exit(4)\n")
+    (folder / "set.toml").write_text('scene = "taylor-green"\nset = 5\n')
+    (folder / "flag.toml").write_text('scene = "taylor-green"\noverwrite = "yes"\n')
     (folder / "colours.toml").write_text("colours = [1, 2]\n")
     for name in ("picture.png", "plain.html"):
         (folder / name).write_text("text")

@@ -22,7 +22,7 @@ def test_times_errors_and_when_it_has_paid():
     ]
     (text,) = verdict(cases)
     assert text == (
-        "on points, tensor, M = 5, at Re 125, 175: 2,000 times faster than the full model, "
+        "On points, tensor, M = 5, at Re 125, 175: 2,000 times faster than the full model, "
         "velocity within 0.5 % (1.2 % in the median over time), "
         "pressure within 4 % (2 % in the median over time). "
         "Making it took 31.9 s, 20 s of them full runs: paid back after 4 runs."
