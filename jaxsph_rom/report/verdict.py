@@ -15,7 +15,7 @@ def verdict(cases: Sequence[Case]) -> list[str]:
     Errors are the largest over time and over the Reynolds numbers that were predicted, or over all
     where none was; the time is the median of their ratios. A model has paid for itself after
 
-        K = ceil((T_training + T_offline) / (t_full - t_reduced))
+        K = (T_training + T_offline) / (t_full - t_reduced), rounded up,
 
     runs, with the mean times of a run and those of the training runs and of what is made of them.
 
