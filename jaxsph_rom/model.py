@@ -194,10 +194,11 @@ class ReducedModel(Model):
         modes, centre = self.basis_at(state.position)
         inverse = self.pseudo_inverse(modes)
         resolved = inverse.expand(state.coordinates).reshape(modes.shape[:2])
-        # a border for the compiler, which else lays the modes out as the sums over pairs want it
-        stacked = lax.optimization_barrier((centre + resolved).reshape(-1))
+        stacked = (centre + resolved).reshape(-1)
 
         def full_rates(stacked):
+            # a border for the compiler, which else lays modes out as sums over pairs want it
+            stacked = lax.optimization_barrier(stacked)
             return self.stacked_rates(
                 time, stacked, state.position, auxiliary, state.coordinates
             )
