@@ -273,6 +273,61 @@ def particle_cavity() -> str:
     return _particles("lid_driven_cavity", 24, timed=True)
 
 
+def _predicted(scene: str) -> str:
+    """Models on 50 x 50 moving particles at unseen Reynolds numbers, and what they are beside."""
+    header = ("start", "Re", "M", "projection", "velocity", "pressure", "of the projection",
+              "low-passed", "full model's sound", "level (peak)", "named")  # fmt: skip
+    names = ("velocity", "pressure", "floor_pressure", "slow_pressure", "sound")
+    rows = [
+        (
+            row["arrangement"],
+            f"{row['reynolds']:g}",
+            str(row["modes"]),
+            row["projection"],
+            *(f"{short(row[f'{n}_peak_percent'])} / {short(row[f'{n}_median_percent'])}"
+              for n in names),
+            short(row["level_peak_percent"]),
+            row["fault"] or row["doubt"] or row["judged"] or "no",
+        )
+        for row in sorted(
+            results(f"particle_modes_{scene}_50"),
+            key=lambda r: (r["arrangement"], r["projection"] != "galerkin", r["reynolds"],
+                           r["modes"]),
+        )
+    ]  # fmt: skip
+    return markdown(header, rows)
+
+
+def predicted_vortex() -> str:
+    """Of the vortex."""
+    return _predicted("taylor_green")
+
+
+def predicted_cavity() -> str:
+    """Of the cavity."""
+    return _predicted("lid_driven_cavity")
+
+
+def particle_step() -> str:
+    """What a step on moving particles costs, times of the process."""
+    header = ("scene", "particles", "M", "projection", "full [ms]", "reduced [ms]", "ratio")
+    return markdown(
+        header,
+        (
+            (
+                row["scene"],
+                str(row["particles"]),
+                str(row["modes"]),
+                row["projection"],
+                short(1e3 * row["full_process_seconds"]["median"], 3),
+                short(1e3 * row["process_seconds"]["median"], 3),
+                short(row["process_ratio"]),
+            )
+            for row in results("particle_step")
+        ),
+    )
+
+
 def versions() -> str:
     """This version beside an earlier one."""
     return markdown(
@@ -302,7 +357,7 @@ TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
         schemes, scheme_models, settled_cavity, still_water, free_flows, particle_vortex,
-        particle_cavity, versions,
+        particle_cavity, predicted_vortex, predicted_cavity, particle_step, versions,
     )  # fmt: skip
 }
 

@@ -14,7 +14,7 @@ from jaxsph import Fluid, Snapshot
 from ..basis import Basis
 
 OFF = 100.0  # percent: a pressure that is off by its own range says nothing
-_UNIFORM = 1e-6  # of the largest range at any time: less is none
+_UNIFORM = 0.01  # times rho0 U^2: a range below that is particles' noise
 
 
 @final
@@ -24,8 +24,9 @@ class TrainedPressure:
 
         e(t) = min_k 100 <|p - p_k(t)|> / range p_k(t),
 
-    p_k the k-th training run's projection on the modes. The run's own error, which is not known as
-    it goes, differs from e by no more than the true pressure differs from the nearest p_k.
+    p_k the k-th training run's projection on the modes, and the range at least 0.01 rho0 U^2, so
+    that a pressure that is uniform but for noise counts as one. The run's own error, which is not
+    known as it goes, differs from e by no more than the true pressure does from the nearest p_k.
 
     Args:
         basis: of the run's model.
@@ -49,10 +50,10 @@ class TrainedPressure:
         """From the times of training runs and their snapshots on the reference points."""
         modes = np.asarray(basis.modes) * np.asarray(basis.weights)[:, None]
         flat, made = modes.reshape(-1, modes.shape[2]), []
+        least = _UNIFORM * float(fluid.reference_density) * float(fluid.reference_speed) ** 2
         for time, snapshots in runs:
             away = snapshots - np.asarray(basis.centre)[:, :, None]
             spread = np.ptp(np.asarray(fluid.pressure(snapshots[:, 0])), axis=0)
-            least = _UNIFORM * spread.max()
             made.append((time, away.reshape(len(flat), -1).T @ flat, np.maximum(spread, least)))
         return cls(basis, fluid, tuple(made))
 
@@ -74,4 +75,5 @@ class TrainedPressure:
 
     def _pressure(self, coordinates) -> Float[np.ndarray, " points"]:
         centre, modes = np.asarray(self.basis.centre)[:, 0], np.asarray(self.basis.modes)[:, 0]
-        return np.asarray(self.fluid.pressure(centre + modes @ np.asarray(coordinates)))
+        density = (centre + modes @ np.asarray(coordinates)).astype(centre.dtype)
+        return np.asarray(self.fluid.pressure(density))

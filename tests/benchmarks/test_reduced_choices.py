@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from benchmarks import larger_steps, memory_length, particle_modes
+from benchmarks import larger_steps, memory_length, particle_modes, particle_step
 
 
 @pytest.fixture(autouse=True)
@@ -95,3 +95,17 @@ def test_any_number_of_modes_on_particles_is_taken_up_again(tmp_path, capsys):
         assert 0 < row["level_peak_percent"] < row["fluctuation_peak_percent"] < 10.0
     assert "apg" in capsys.readouterr().out
     assert particle_modes.main([*same, "--cutoff", "3"]) == 2
+
+
+@pytest.mark.slow
+def test_a_step_on_particles_is_timed_beside_the_full_models(tmp_path, capsys):
+    path = tmp_path / "step.json"
+    same = ["--scenes", "taylor-green", "--resolution", "16", "--modes", "3", "--repeats", "2"]
+    for projections in (["galerkin"], ["galerkin", "apg"]):  # what is timed again is replaced
+        assert particle_step.main([*same, "--json", str(path), "--projections", *projections]) == 0
+    rows = results(path)["rows"]
+    assert [(row["modes"], row["projection"]) for row in rows] == [(3, "galerkin"), (3, "apg")]
+    for row in rows:
+        seconds, full = row["process_seconds"]["median"], row["full_process_seconds"]["median"]
+        assert row["particles"] == 256 and row["process_ratio"] == pytest.approx(seconds / full)
+    assert "reduced [ms]" in capsys.readouterr().out

@@ -64,6 +64,22 @@ def test_how_far_is_told_of_the_nearest_run_in_its_range(watch):
     assert watch.percent(TIME[3], far) == pytest.approx(100.0 * 2.0 / np.pi * 6.3 / 4.0, rel=2e-2)
 
 
+def test_single_precision():
+    fluid = Fluid(*(jnp.asarray(a, jnp.float32) for a in (1000.0, 10.0, 1.0)))
+    run = snapshots(1.0).astype(np.float32)
+    basis = pod(run, Energy(), fluid, modes=2)
+    watch = TrainedPressure.of(basis, fluid, [(TIME, run)])
+    found = coordinates(watch, run, 4).astype(np.float32)
+    assert watch.percent(TIME[4], found) < 0.1  # a density of 1000 has seven digits, a range of 1
+
+
+def test_noise_is_no_range(watch):
+    quiet, loud = snapshots(1e-3), snapshots(3e-3)  # some 0.2 Pa, where rho0 U^2 is 1000 Pa
+    still = TrainedPressure.of(watch.basis, watch.fluid, [(TIME, quiet)])
+    assert still.percent(0.0, coordinates(watch, loud, 0)) < 2.0
+    assert still.percent(0.0, coordinates(watch, snapshots(1.0), 0)) > 100.0
+
+
 def test_what_is_off_by_more_than_its_range_is_named(watch):
     def said(strength):
         state = eqx.tree_at(lambda s: s.coordinates, snapshot, coordinates(watch, strength, 3))
