@@ -3,7 +3,8 @@
     python -m benchmarks.channel_cylinder --resolutions 33 41 66
 
 Means and standard deviations of the coefficients over the second half of each run, whose force is
-taken every few steps. Every finished run's row is in the JSON file at once; the same command goes
+taken every few steps; of the pressure before the cylinder less that behind it; and by how much the
+mass flux along the channel is off at the worst of its sections. Every finished run's row is in the JSON file at once; the same command goes
 on where it was cut short.
 """
 
@@ -12,20 +13,26 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import run_scene
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
+from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import channel_cylinder
-from jaxsph.scenes.channel_cylinder import DIAMETER, MEAN
+from jaxsph.scenes.channel_cylinder import CYLINDER, DIAMETER, HEIGHT, LENGTH, MEAN
 
 from .measure import format_rows, number, progress
 from .table import Table, command
 
 KEY = ("resolution", "h_over_dx", "mach", "end_time")
-LITERATURE = {"drag": (5.57, 5.59), "lift": (0.0104, 0.0110)}  # at Re = 20
+LITERATURE = {  # at Re = 20; pascals
+    "drag": (5.57, 5.59), "lift": (0.0104, 0.0110), "pressure_difference": (0.1172, 0.1176)
+}  # fmt: skip
+SECTIONS = 11  # of the channel
 EACH = 5  # steps from force to force, or fewer
 
 
@@ -48,8 +55,9 @@ def _run(options) -> None:
     cases = (dict(zip(KEY, (n, *shared), strict=True)) for n in options.resolutions)
     for case in kept.left(cases):
         kept.add(case | run(case))
-    head = ("resolution", "across D", "drag", "+-", "lift", "+-", "seconds")
-    names = ("across_cylinder", "drag", "drag_deviation", "lift", "lift_deviation", "seconds")
+    head = ("resolution", "across D", "drag", "+-", "lift", "+-", "dp [Pa]", "flux %", "seconds")
+    names = ("across_cylinder", "drag", "drag_deviation", "lift", "lift_deviation",
+             "pressure_difference", "mass_flux_off_percent", "seconds")  # fmt: skip
     rows = [(str(r["resolution"]), *(number(r[name], 4) for name in names)) for r in kept.rows]
     print(format_rows(head, rows))
 
@@ -75,6 +83,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         "drag_deviation": float(deviation[0]),
         "lift": float(mean[1]),
         "lift_deviation": float(deviation[1]),
+        "pressure_difference": pressure_difference(scene.space, trajectory, late),
+        "mass_flux_off_percent": 100.0 * flux_off(float(scene.mass), trajectory, late),
         "forces_taken": int(late.sum()),
         "fastest": float(np.linalg.norm(trajectory.velocity[-1], axis=1).max()),
         "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
@@ -85,6 +95,28 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         "device": jax.devices()[0].device_kind,
         "environment": environment(),
     }
+
+
+def pressure_difference(space, trajectory, late) -> float:
+    """Mean pressure [Pa] at the cylinder's foremost point less that at its hindmost, by moving
+    least squares of the particles there."""
+    apart = np.array([[-CYLINDER.radius, 0.0], [CYLINDER.radius, 0.0]])
+    points = jnp.asarray(np.asarray(CYLINDER.center) + apart)
+    there = eqx.filter_jit(MovingLeastSquaresMap.allocate(points, space))
+    found = []
+    for position, pressure in zip(trajectory.position[late], trajectory.pressure[late], strict=True):
+        values, overflow = there(jnp.asarray(position), jnp.asarray(pressure)[:, None])
+        found.append(np.nan if overflow else float(values[0, 0] - values[1, 0]))
+    return float(np.mean(found))
+
+
+def flux_off(mass: float, trajectory, late) -> float:
+    """The worst section's mean mass flux over rho0 U H, less 1, in size."""
+    x, u = trajectory.position[late][..., 0], trajectory.velocity[late][..., 0]
+    edges = np.linspace(0.0, LENGTH, SECTIONS + 1)
+    total, _ = np.histogram(x.ravel(), edges, weights=u.ravel())
+    flux = mass * total / (np.diff(edges) * len(x) * MEAN * HEIGHT)
+    return float(np.abs(flux - 1.0).max())
 
 
 if __name__ == "__main__":

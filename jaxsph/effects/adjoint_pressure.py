@@ -2,13 +2,15 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from ..at_ghosts import Otherwise, Same
 from ..kernel_moments import lattice_moments
 from ..pairs import PairTerm, pair_sum
+from ..ramps import ramp
 from ..symmetric import product, times
 from .base import Context, Effect, given
 from .continuity import Continuity
@@ -16,6 +18,7 @@ from .pressure_force import PressureForce
 from .wall_pressure import GHOST_WEIGHT, WallPressure, per_weight
 
 _LONELY = 0.05  # of a full neighbourhood's kernel sum: no mean is taken over fewer
+_BESIDE = (0.0, 0.02)  # of the kernel's sum that is ghosts'; beside a wall it is a quarter
 
 
 def neighbor_share(pair, i, j):
@@ -83,6 +86,7 @@ def wall_pressure_flux(pair, i, j):
     return product(i.pressure_tensor, pair.gradient) + j.handed_force * (pair.kernel / i.volume)
 
 
+WALL_SHARE = PairTerm("wall_share", (), None, Otherwise((), neighbor_share))
 _GATHERED = (
     GHOST_WEIGHT,
     PairTerm("ghost_mean_pressure", ("acting_pressure",), ghost_mean_pressure),
@@ -122,11 +126,21 @@ class AdjointPressure(Effect):
     at rest in it, of enthalpy C - Phi_i with C the mean of a particle's own enthalpy plus Phi, and
     that pressure's force -b rho_rest / rho_i added in closed form; so a fluid at rest stays there.
 
+    Beside a wall S is a mean over one side. Where a flow meets a wall head-on and turns, it takes
+    the fluid farther out for that at the wall. X S + 1 - X in place of S, X any diagonal, has the
+    same identities: X falls from 1 to `wall_smoothing` where ghosts hold a fiftieth of the kernel's
+    sum.
+
     Needs `KernelCorrection` before it. Not for free surfaces, nor for bodies that are moved.
+
+    Args:
+        wall_smoothing: X in the layer beside a wall, 0 to 1.
 
     Raises:
         ValueError: where bodies are moved through the fluid, and beside `FreeSurface`.
     """
+
+    wall_smoothing: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
 
     def on_fixed_points(self):
         # in good order the plain pair is accurate, and each other's adjoint as it is
@@ -136,6 +150,7 @@ class AdjointPressure(Effect):
         return (
             PairTerm("neighbor_share", (), neighbor_share),
             PairTerm("neighbor_velocity", ("velocity",), neighbor_velocity),
+            WALL_SHARE,
         )
 
     def fields(self, context, fields, sums):
@@ -150,11 +165,14 @@ class AdjointPressure(Effect):
         share = sums["neighbor_share"]
         met = share > _LONELY
         share = jnp.where(met, share, 1.0)[:, None]
-        rough = jnp.where(met[:, None], velocity - sums["neighbor_velocity"] / share, 0.0)
+        beside = ramp(sums["wall_share"], *_BESIDE) if "wall_share" in sums else 0.0
+        smoothing = jnp.where(met, 1.0 - (1.0 - self.wall_smoothing) * beside, 0.0)[:, None]
+        rough = smoothing * (velocity - sums["neighbor_velocity"] / share)
         sharp = 1.0 + _sharpening(context.space)
         return balance | {
             "acting_pressure": acting,
-            "neighbor_weight": jnp.where(met[:, None], 1.0 / share, 0.0),
+            "smoothing": smoothing,
+            "neighbor_weight": smoothing / share,
             "smooth_velocity": velocity - rough,
             "rough_velocity": sharp * times(correction, rough),
             "pressure_tensor": acting[:, None] * correction,
@@ -207,9 +225,7 @@ class AdjointPressure(Effect):
         handed = pair_sum(
             _HANDED, fields | {"smoothed_force": smoothed}, context.space, context.pairs
         )
-        alone = fields["neighbor_weight"] <= 0.0
-        gradient = jnp.where(alone, sums["pressure_flux"], gradient)
-        gradient = gradient + handed["handed_force"]
+        gradient = gradient + (1.0 - fields["smoothing"]) * excess + handed["handed_force"]
         divergence = sums["smooth_divergence"] + sums["rough_divergence"]
         divergence = divergence - jnp.sum(volume * divergence) / jnp.sum(volume)
         velocity = -gradient / density[:, None]

@@ -2,11 +2,9 @@
 
 import jax.numpy as jnp
 
-from ..at_ghosts import Otherwise
-from ..pairs import PairTerm
 from ..ramps import ramp
 from ..symmetric import along
-from .adjoint_pressure import neighbor_share
+from .adjoint_pressure import WALL_SHARE
 from .base import Effect, given
 
 _NEAR = (0.95, 1.0)  # of the kernel's sum that is fluid's
@@ -28,7 +26,7 @@ class ConsistentTransport(Effect):
         return ()  # nothing is shifted there
 
     def geometry_terms(self, context):
-        return (PairTerm("wall_share", (), None, Otherwise((), neighbor_share)),)
+        return (WALL_SHARE,)
 
     def fields(self, context, fields, sums):
         given(fields, "velocity_gradient", self, "KernelCorrection")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..arrangements import Arrangement
 from ..kernels import Kernel
-from ..schemes import Scheme
+from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, WallPart
 from .composed import pick_scale, positive
 from .open_channel import open_channel
@@ -54,7 +54,7 @@ def channel_cylinder(
         layers: of ghosts; a full support's if none is given.
         arrangement: how particles start; the lattice if none is given.
         kernel: Wendland C2 if none is given.
-        scheme: of `jaxsph.schemes`; `Consistent()` if none is given.
+        scheme: of `jaxsph.schemes`; `SharpAtWalls()` if none is given.
         mach: Mach number of the inflow's peak, 1.5 U / c0.
         dtype: float64 or float32; JAX's default if none is given.
 
@@ -77,7 +77,7 @@ def channel_cylinder(
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
-        scheme=scheme,
+        scheme=SharpAtWalls() if scheme is None else scheme,
         dtype=dtype,
         parameters={"scale": scale, "reynolds": reynolds},
     )

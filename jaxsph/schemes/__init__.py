@@ -5,5 +5,6 @@ from .consistent import Consistent as Consistent
 from .delta_plus import DELTA as DELTA
 from .delta_plus import DeltaPlus as DeltaPlus
 from .delta_plus import delta_plus as delta_plus
+from .sharp_at_walls import SharpAtWalls as SharpAtWalls
 
 SCHEMES = {"delta-plus": DeltaPlus(), "consistent": Consistent()}
