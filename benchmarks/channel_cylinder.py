@@ -4,8 +4,8 @@
 
 Means and standard deviations of the coefficients over the second half of each run, whose force is
 taken every few steps; of the pressure before the cylinder less that behind it; and by how much the
-mass flux along the channel is off at the worst of its sections. Every finished run's row is in the JSON file at once; the same command goes
-on where it was cut short.
+mass flux along the channel is off at the worst of its sections. Every finished run's row is in the
+JSON file at once; the same command goes on where it was cut short.
 """
 
 from __future__ import annotations
@@ -104,8 +104,9 @@ def pressure_difference(space, trajectory, late) -> float:
     points = jnp.asarray(np.asarray(CYLINDER.center) + apart)
     there = eqx.filter_jit(MovingLeastSquaresMap.allocate(points, space))
     found = []
-    for position, pressure in zip(trajectory.position[late], trajectory.pressure[late], strict=True):
-        values, overflow = there(jnp.asarray(position), jnp.asarray(pressure)[:, None])
+    for k in np.flatnonzero(late):
+        pressure = jnp.asarray(trajectory.pressure[k])[:, None]
+        values, overflow = there(jnp.asarray(trajectory.position[k]), pressure)
         found.append(np.nan if overflow else float(values[0, 0] - values[1, 0]))
     return float(np.mean(found))
 

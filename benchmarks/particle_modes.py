@@ -28,25 +28,15 @@ from jaxsph.environment import environment
 from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import SCENES
 from jaxsph.schemes import SCHEMES
-from jaxsph_rom import (
-    AdjointPetrovGalerkin,
-    Experiment,
-    Galerkin,
-    LatticePolynomials,
-    LocalSplines,
-    OnParticles,
-    Study,
-    low_pass,
-)
+from jaxsph_rom import Experiment, OnParticles, Study, low_pass
 from jaxsph_rom.study import doubt, level_and_fluctuation
 
 from .measure import format_rows, number, progress
+from .particle_models import INTERPOLATIONS, PROJECTIONS
 from .table import Table, command
 
-INTERPOLATIONS = {"splines": LocalSplines, "polynomials": LatticePolynomials}
 KEY = ("scheme", "arrangement", "interpolation", "reynolds", "modes", "projection")
 MODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 30, 40, 50)
-PROJECTIONS = {"galerkin": Galerkin(), "apg": AdjointPetrovGalerkin(1e-4)}
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -26,7 +26,7 @@ from jaxsph.scenes import SCENES
 from jaxsph_rom import Energy, ReducedModel, ReferenceSpace, pod
 
 from .measure import alternate, compiled, format_rows, number, summary
-from .particle_modes import INTERPOLATIONS, PROJECTIONS
+from .particle_models import INTERPOLATIONS, PROJECTIONS
 from .table import Table, command
 
 KEY = ("scene", "resolution", "interpolation", "modes", "projection")
