@@ -31,8 +31,9 @@ from jaxsph.scenes.elliptic_drop import semi_axes
 from jaxsph.scenes.gresho_vortex import gresho_velocity
 from jaxsph.scenes.piston_wave_maker import wave_height, wave_number
 from jaxsph.scenes.standing_wave import damping
-from jaxsph.schemes import SCHEMES, Scheme
+from jaxsph.schemes import Scheme
 
+from .both_schemes import SCHEMES
 from .measure import format_rows, number, progress
 from .references.dam_break import (
     FRONT,

@@ -22,8 +22,9 @@ from jaxsph.effects import Gravity, LaminarViscosity
 from jaxsph.environment import environment
 from jaxsph.kernels import WendlandC2
 from jaxsph.scenes import Scene, dam_break
-from jaxsph.schemes import SCHEMES, Scheme
+from jaxsph.schemes import Scheme
 
+from .both_schemes import SCHEMES
 from .measure import format_rows, number, progress
 from .table import Table, command
 

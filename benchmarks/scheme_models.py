@@ -25,10 +25,10 @@ from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.metrics import centre_line, probe
 from jaxsph.scenes import lid_driven_cavity, taylor_green
-from jaxsph.schemes import SCHEMES
 from jaxsph_rom import LinearClosure
 from jaxsph_rom.points import mapped_run
 
+from .both_schemes import SCHEMES
 from .measure import format_rows, number, progress, tell
 from .reduced_vortex import discrepancies
 from .table import Table, command

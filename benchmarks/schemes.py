@@ -22,8 +22,8 @@ import numpy as np
 from jaxsph import SimulationError, run_scene
 from jaxsph.environment import environment
 from jaxsph.scenes import SCENES, Scene
-from jaxsph.schemes import SCHEMES
 
+from .both_schemes import SCHEMES
 from .measure import alternate, compiled, format_rows, number, progress
 from .scheme_scenes import KINDS
 from .table import Table, command

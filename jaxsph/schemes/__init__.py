@@ -7,4 +7,8 @@ from .delta_plus import DeltaPlus as DeltaPlus
 from .delta_plus import delta_plus as delta_plus
 from .sharp_at_walls import SharpAtWalls as SharpAtWalls
 
-SCHEMES = {"delta-plus": DeltaPlus(), "consistent": Consistent()}
+SCHEMES = {
+    "delta-plus": DeltaPlus(),
+    "consistent": Consistent(),
+    "sharp-at-walls": SharpAtWalls(),
+}

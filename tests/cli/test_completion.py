@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from jaxsph.scenes import SCENES
+from jaxsph.schemes import SCHEMES
 from jaxsph_command import main
 from jaxsph_command.commands import COMMANDS
 
@@ -50,7 +51,7 @@ def test_commands_scenes_options_and_choices(complete):
     assert complete("jaxsph run dam") == {"dam-break"}
     assert complete("jaxsph run dam-break --al") == {"--alpha"}  # a setting of that scene
     assert complete("jaxsph run dam-break --reso") == {"--resolution"}
-    assert complete("jaxsph run dam-break --scheme ") == {"delta-plus", "consistent"}
+    assert complete("jaxsph run dam-break --scheme ") == set(SCHEMES)
     assert complete("jaxsph run lid-driven-cavity --lid reg") == {"regularised"}
     assert complete("jaxsph-rom train taylor-green --clos") >= {"--closure", "--closure-iterations"}
 
