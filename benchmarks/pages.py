@@ -353,11 +353,42 @@ def _error(row: Row) -> str:
     )
 
 
+def cheapest_settings() -> str:
+    """The cheapest full model in either scheme and the cheapest reduced model within an error, of
+    the Taylor-Green vortex."""
+    path = ROOT / "benchmarks" / "results" / "work_precision_full.json"
+    rows = json.loads(path.read_text(encoding="utf-8"))["scenes"]["taylor-green"]["rows"]
+    kinds = (
+        [r for r in rows if r["settings"].get("scheme") == "delta-plus"],
+        [r for r in rows if r["settings"].get("scheme") == "consistent"],
+        [r for r in rows if r["family"] == "tensor"],
+    )
+
+    def best(kind: list[Row], measure: str, wanted: float) -> str:
+        within = [r for r in kind if r["fault"] is None and r[measure] <= wanted]
+        row = min(within, key=lambda r: r["run_seconds"]["median"], default=None)
+        return "none" if row is None else f"{row['label']}: {_time(row['run_seconds']['median'])}"
+
+    wanted = [("velocity", "velocity_peak_percent", e) for e in (2.0, 1.0, 0.5, 0.2)]
+    wanted += [("pressure", "pressure_median_percent", e) for e in (10.0, 3.0, 2.0)]
+    head = ("wanted", "delta-plus scheme", "consistent scheme", "tensors of delta-plus runs")
+    return markdown(
+        head,
+        ((f"{name} {e:g} %", *(best(kind, measure, e) for kind in kinds))
+         for name, measure, e in wanted),
+    )  # fmt: skip
+
+
+def _time(seconds: float) -> str:
+    return f"{short(seconds)} s" if seconds >= 0.05 else f"{short(1e3 * seconds)} ms"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
         schemes, scheme_models, settled_cavity, still_water, free_flows, particle_vortex,
         particle_cavity, predicted_vortex, predicted_cavity, particle_step, versions,
+        cheapest_settings,
     )  # fmt: skip
 }
 
