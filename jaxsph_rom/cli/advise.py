@@ -24,7 +24,9 @@ def add_to(parser: Parser, words: list[str]) -> None:
     )
     parser.set_defaults(command=_advise)
     add = parser.add_argument
-    add("scene", metavar="SCENE", help="that was measured: taylor-green or lid-driven-cavity")
+    add("scene", metavar="SCENE",
+        help="that was measured: taylor-green, lid-driven-cavity, poiseuille, couette or "
+        "hydrostatic-tank")  # fmt: skip
     add("--velocity-error", type=_read(advice.percent), metavar="E",
         help="relative L2 error of the velocity, largest over time, as 1%%")  # fmt: skip
     add("--pressure-error", type=_read(advice.percent), metavar="E",
