@@ -128,19 +128,19 @@ class AdjointPressure(Effect):
 
     Beside a wall S is a mean over one side. Where a flow meets a wall head-on and turns, it takes
     the fluid farther out for that at the wall. X S + 1 - X in place of S, X any diagonal, has the
-    same identities: X falls from 1 to `wall_smoothing` where ghosts hold a fiftieth of the kernel's
-    sum.
+    same identities: X falls from 1 to `boundary_smoothing` where ghosts hold a fiftieth of the
+    kernel's sum.
 
     Needs `KernelCorrection` before it. Not for free surfaces, nor for bodies that are moved.
 
     Args:
-        wall_smoothing: X in the layer beside a wall, 0 to 1.
+        boundary_smoothing: X in the layer beside a wall, 0 to 1.
 
     Raises:
         ValueError: where bodies are moved through the fluid, and beside `FreeSurface`.
     """
 
-    wall_smoothing: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
+    boundary_smoothing: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=1.0)
 
     def on_fixed_points(self):
         # in good order the plain pair is accurate, and each other's adjoint as it is
@@ -166,7 +166,7 @@ class AdjointPressure(Effect):
         met = share > _LONELY
         share = jnp.where(met, share, 1.0)[:, None]
         beside = ramp(sums["wall_share"], *_BESIDE) if "wall_share" in sums else 0.0
-        smoothing = jnp.where(met, 1.0 - (1.0 - self.wall_smoothing) * beside, 0.0)[:, None]
+        smoothing = jnp.where(met, 1.0 - (1.0 - self.boundary_smoothing) * beside, 0.0)[:, None]
         rough = smoothing * (velocity - sums["neighbor_velocity"] / share)
         sharp = 1.0 + _sharpening(context.space)
         return balance | {

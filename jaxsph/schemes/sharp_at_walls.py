@@ -22,7 +22,7 @@ class SharpAtWalls(Scheme):
 
     def effects(self, viscosity=None, force=None, vessel=None, wall_velocity=None):
         correction, _, *others = Consistent().effects(viscosity, force, vessel, wall_velocity)
-        return (correction, AdjointPressure(wall_smoothing=0.0), *others)
+        return (correction, AdjointPressure(boundary_smoothing=0.0), *others)
 
     def free_surface_effects(self, *more, force=None, vessel=None, wall_velocity=None):
         """Those of `Consistent`, which smooths nothing there."""

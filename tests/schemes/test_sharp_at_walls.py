@@ -55,4 +55,4 @@ def test_it_is_the_consistent_scheme_elsewhere():
     state = disturbed(periodic[0])
     found, expected = (rates_of(scene)(state) for scene in periodic)
     np.testing.assert_array_equal(found.velocity, expected.velocity)
-    assert float(AdjointPressure().wall_smoothing) == 1.0
+    assert float(AdjointPressure().boundary_smoothing) == 1.0
