@@ -17,7 +17,7 @@ class SharpAtWalls(Scheme):
 
     At a stagnation point the mean over a particle's neighbours is that of the fluid farther out,
     which still moves: with it the layer beside a body runs into its wall, and drag is too high
-    (docs, "open boundaries"). Energy is conserved in the same way.
+    (docs, "open boundaries"; judged there at h = 1.5 dx). Energy is conserved in the same way.
     """
 
     def effects(self, viscosity=None, force=None, vessel=None, wall_velocity=None):

@@ -62,6 +62,8 @@ class Outline(Region):
         return tuple(corners.min(axis=0).tolist()), tuple(corners.max(axis=0).tolist())
 
     def signed_distance(self, position):
+        if position.shape[1] != 2:
+            raise ValueError(f"Outline: is of the plane, got points in {position.shape[1]} axes.")
         starts, ends = (jnp.asarray(a, position.dtype) for a in self._segments())
         along = ends - starts
         x, y = position[:, :1], position[:, 1:]

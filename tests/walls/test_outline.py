@@ -93,3 +93,8 @@ def test_walls_around_a_fine_polygon_are_those_of_the_disc():
 def test_what_is_no_outline_is_refused(rings, message):
     with pytest.raises(ValueError, match=message):
         Outline(rings)
+
+
+def test_points_in_space_are_refused():
+    with pytest.raises(ValueError, match="of the plane, got points in 3 axes"):
+        Outline([star()]).signed_distance(jnp.zeros((4, 3)))
