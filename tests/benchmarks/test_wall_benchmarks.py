@@ -14,6 +14,8 @@ from benchmarks import (
     wall_cost,
     walled_rom,
 )
+from benchmarks.centre_lines import centre_line_errors, published
+from benchmarks.references.lid_driven_cavity import LIDS, solve
 
 
 @pytest.fixture(autouse=True)
@@ -61,10 +63,20 @@ def test_the_viscous_sum_on_a_lattice(tmp_path):
 
 
 def test_misprints_of_the_tables_do_not_count():
-    column = lid_driven_cavity._table_column("v", 400)
-    assert (
-        np.isnan(column).sum() == 1 and np.isfinite(lid_driven_cavity._table_column("u", 400)).all()
-    )
+    assert np.isnan(published("v", 400)).sum() == 1 and np.isfinite(published("u", 400)).all()
+
+
+def test_centre_lines_of_the_exact_flow_are_right():
+    side = (np.arange(50) + 0.5) / 50
+    points = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+    time = np.linspace(0.0, 2.0, 11)
+    exact = solve(100, LIDS["constant"]).velocity(points)
+    still = [np.broadcast_to(values, (11, *values.shape)) for values in (points, exact)]
+    found = centre_line_errors(time, *still, 1.0 / 50, 100, "constant")
+    assert max(found["u_error_percent"], found["v_error_percent"]) < 0.3  # the probe's own error
+    assert found["change_percent"] < 1e-10 and found["change_over_seconds"] == 1.0
+    late = centre_line_errors(time, still[0], 1.1 * still[1], 1.0 / 50, 100, "constant")
+    assert late["u_error_percent"] > 5.0
 
 
 def test_cases_of_the_cavity_have_whole_intervals():
