@@ -5,8 +5,9 @@
 The example that PySPH ships, as it comes but for its size, Reynolds number and end, by its
 transport-velocity scheme and by the scheme it recommends for internal flows, EDAC; on one core,
 from rest for as long as `benchmarks.lid_driven_cavity --cases settled` has altogether. Centre lines
-are judged as ours are. `python -m benchmarks.peers.setup` makes PySPH's environment. Finished rows
-are kept: the same command goes on.
+are judged as ours are; times are the processor's, which other work on the machine blurs less.
+`python -m benchmarks.peers.setup` makes PySPH's environment. Finished rows are kept: the same
+command goes on.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def run(python: Path, case: dict[str, Any]) -> dict[str, Any]:
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
-    header = ("scheme", "Re", "side", "u %", "v %", "last change %", "run s", "fault")
+    header = ("scheme", "Re", "side", "u %", "v %", "last change %", "CPU s", "fault")
     cells = [
         (
             row["scheme"], str(row["reynolds"]), str(row["resolution"]),
