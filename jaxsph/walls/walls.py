@@ -103,6 +103,7 @@ class Walls(eqx.Module):
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
         distance = partial(_in_blocks, _distance, fluid_region)
         _refuse_gaps(distance, space)
+        _refuse_torn_walls(distance, space)
         lattice = space.lattice(layers)
         depth = distance(lattice)
         thickness = layers * space.spacing
@@ -329,23 +330,46 @@ def _at(point) -> str:
 
 def _refuse_gaps(distance, space: Space) -> None:
     """The fluid must not reach past a closed face of the box."""
-    box, dx = space.box, space.spacing
+    box = space.box
     for axis, side in product(range(box.dim), (0, 1)):
         if box.periodic[axis]:
             continue
-        ticks = []
-        for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
-            count = 1 if k == axis else max(2, round(length / (_PITCH * dx)) + 1)
-            ticks.append(low + np.linspace(0.0, length, count))
-        ticks[axis] = np.asarray([(box.lower, box.upper)[side][axis]])
-        face = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
+        face = _face(space, axis, (box.lower, box.upper)[side][axis])
         depth = distance(face)
-        if depth.min() < -_TOUCH * dx:
+        if depth.min() < -_TOUCH * space.spacing:
             raise ValueError(
                 f"walls: a gap at {_at(face[int(np.argmin(depth))])}: the fluid reaches past a "
                 "closed face of its box there. Close it with a wall, widen the box, or make that "
                 "direction periodic."
             )
+
+
+def _refuse_torn_walls(distance, space: Space) -> None:
+    """What is wall on one periodic face of the box must be wall on the other: it is one place."""
+    box, least = space.box, _TOUCH * space.spacing
+    for axis in range(box.dim):
+        if not box.periodic[axis]:
+            continue
+        faces = [_face(space, axis, end[axis]) for end in (box.lower, box.upper)]
+        low, high = (distance(face) for face in faces)
+        torn = ((low > least) & (high < -least)) | ((low < -least) & (high > least))
+        if torn.any():
+            here, there = (face[int(np.argmax(torn))] for face in faces)
+            raise ValueError(
+                f"walls: torn at a periodic face of the box: {_at(here)} and {_at(there)} are one "
+                "place, a wall by the one and fluid by the other. Move the body off the face, or "
+                "join it with its copy a box's length further: body | copy."
+            )
+
+
+def _face(space: Space, axis: int, at: float) -> np.ndarray:
+    """Points of a face of the box, a fraction of a spacing apart."""
+    box, ticks = space.box, []
+    for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
+        count = 1 if k == axis else max(2, round(length / (_PITCH * space.spacing)) + 1)
+        ticks.append(low + np.linspace(0.0, length, count))
+    ticks[axis] = np.asarray([at])
+    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
 
 
 def _refuse_thin_walls(distance, space: Space, surface, normal) -> None:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import Box, BoxRegion, MovingWall, SignedDistance, Space, Walls
+from jaxsph import BallRegion, Box, BoxRegion, MovingWall, SignedDistance, Space, Walls
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.kernels import QuinticSpline, WendlandC2
 from jaxsph.scenes import couette, lid_driven_cavity
@@ -16,6 +16,7 @@ from jaxsph.walls.walls import fill
 SIDE = 20
 DX = 1.0 / SIDE
 SQUARE = BoxRegion((0.0, 0.0), (1.0, 1.0))
+CHANNEL = BoxRegion((-np.inf, 0.0), (np.inf, 1.0))
 ROUND_OFF = 1e-13
 
 
@@ -184,6 +185,21 @@ def test_round_vessels_from_their_signed_distance(dim, side, area, margin):
     assert len(radius) * dx**dim == pytest.approx(shell, rel=margin)
 
 
+def test_a_body_across_a_periodic_face_is_one_in_the_middle():
+    halves = BallRegion((0.0, 0.5), 0.25) | BallRegion((1.0, 0.5), 0.25)
+    across, amid = (
+        Walls.around(CHANNEL & ~body, space(periodic=(True, False)))
+        for body in (halves, BallRegion((0.5, 0.5), 0.25))
+    )
+    moved = np.array(across.position)
+    moved[:, 0] = (moved[:, 0] + 0.5) % 1.0
+
+    def ordered(points):
+        return points[np.lexsort(np.round(points, 6).T)]
+
+    np.testing.assert_allclose(ordered(moved), ordered(np.asarray(amid.position)), atol=1e-9)
+
+
 # ------------------------------------------------------------------ what is refused
 
 
@@ -234,6 +250,12 @@ REFUSED = {
         "thinner than twice the kernel's support",
         lambda: Walls.around(
             BoxRegion((0.1, -np.inf), (0.9, np.inf)), space(periodic=(True, True))
+        ),
+    ),
+    "half a body at a periodic face": (
+        r"walls: torn at a periodic face of the box: \(0, 0\.\d+\) m and \(1, 0\.\d+\) m are one",
+        lambda: Walls.around(
+            CHANNEL & ~BallRegion((0.0, 0.5), 0.25), space(periodic=(True, False))
         ),
     ),
     "no wall at all": (
