@@ -53,8 +53,15 @@ def test_lists_scenes(capsys):
         for table in (vars(module).get(n) for n in ("SCALES", "SCALES_3D") if n in vars(module)):
             if table["small"].resolution == sizes["small"]["resolution"]:
                 assert {k: dataclasses.asdict(v) for k, v in table.items()} == sizes
-    assert main(["scenes", "dam-break", "--scale", "small"]) == 0
+    assert main(["scenes", "--json", "new/all.json"]) == 0
+    told = json.loads(Path("new/all.json").read_text())
+    assert tuple(told) == tuple(SCENES) and told["dam-break"]["sizes"]["small"]["resolution"] > 0
+    assert main(["scenes", "dam-break", "--scale", "small", "--json", "one.json"]) == 0
     printed = capsys.readouterr().out
+    told = json.loads(Path("one.json").read_text())["dam-break"]
+    assert told["built"]["small"]["particles"] == 1800
+    assert "FreeSurface" in told["built"]["small"]["effects"]
+    assert "[m]" in told["settings"]["tank"]
     for word in ("PressureForce", "FreeSurface", "1800 particles", "column"):
         assert word in printed
 
