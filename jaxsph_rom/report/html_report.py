@@ -12,7 +12,7 @@ from jaxsph.report import page
 from jaxsph.report.settings import environment_rows, parameter_rows
 
 from .case import Case
-from .table import COLUMNS, cells, heading, wrong
+from .table import COLUMNS, cells, heading, remarks
 from .verdict import verdict
 
 FILE_NAME = "report.html"
@@ -49,7 +49,7 @@ def write_html_report(
     numbers = [column[2] == ">" for column in COLUMNS]
     for name, group in itertools.groupby(cases, key=heading):
         pieces += [page.paragraph(name), page.table(_NAMES, map(cells, group), numbers)]
-    pieces += map(page.paragraph, wrong(cases))
+    pieces += map(page.paragraph, remarks(cases))
     pieces += map(page.paragraph, verdict(cases))
     pieces.append(
         page.paragraph(
