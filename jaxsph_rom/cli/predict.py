@@ -22,6 +22,7 @@ from jaxsph.cli.options import MOST_NUMBERS, add_json_option, write_json
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
+from jaxsph_command.config import repeating
 
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
@@ -83,7 +84,7 @@ def _predict(options) -> int:
         lost = _write_members(options, trained, prediction, folder)
     results = results_of(trained, prediction, options.model, path)
     write_json(options.json, {**results, **environment()})
-    page = write_report(folder, results, trained, prediction)
+    page = write_report(folder, results, trained, prediction, repeating(options))
     print_prediction(results, trained, prediction)
     print(f"\nreport: {page}, {page.with_suffix('.json')}")
     return fail("jaxsph-rom", lost, 1) if lost else 0

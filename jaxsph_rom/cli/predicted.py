@@ -112,7 +112,11 @@ def print_prediction(
 
 
 def write_report(
-    folder: Path, results: dict[str, Any], trained: TrainedModel, prediction: Prediction
+    folder: Path,
+    results: dict[str, Any],
+    trained: TrainedModel,
+    prediction: Prediction,
+    command: str,
 ) -> Path:
     """Write `report.json` and `report.html`; the path of the page."""
     return write_prediction_report(
@@ -123,6 +127,7 @@ def write_report(
         [f"{ERRORS_TOLD}:", *error_lines(trained.training)],
         _figures(trained, prediction),
         environment(),
+        command,
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxsph.report import page
-from jaxsph.report.settings import environment_rows
+from jaxsph.report.settings import origin_rows
 
 from . import html_report, json_report
 from .plain import plain
@@ -24,6 +24,7 @@ def write_prediction_report(
     notes: Iterable[str],
     figures: Iterable[tuple[bytes, str]],
     environment: Mapping[str, Mapping[str, Any]],
+    command: str | None = None,
 ) -> Path:
     """Write both files, and return the path of the page.
 
@@ -35,6 +36,7 @@ def write_prediction_report(
         notes: what the model gets wrong on the runs that it was trained on, a line each.
         figures: PNG pictures, and what each shows.
         environment: as `jaxsph.environment.environment` gives it.
+        command: that made it, if one did.
     """
     columns, lines = members
     text = json.dumps(plain({**results, **environment}), indent=2, allow_nan=False)
@@ -47,6 +49,6 @@ def write_prediction_report(
     pieces += [page.heading("Runs"), page.table(columns, lines[:LISTED], [True] * len(columns))]
     if len(lines) > LISTED:
         pieces.append(page.paragraph(f"The first {LISTED} of {len(lines)}; prediction.h5 has all."))
-    pieces += [page.heading("Versions and machine"), page.rows(environment_rows(environment))]
+    pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     path = folder / html_report.FILE_NAME
     return page.write_page(path, f"jaxsph-rom: prediction of {results['scene']}", pieces)
