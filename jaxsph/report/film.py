@@ -48,7 +48,7 @@ def film(source: str | os.PathLike) -> str:
 
 def _piece(times, places, values, fields, walls) -> str:
     everything = np.concatenate([*places, walls])
-    side = OVERLAP * max(spacing(places[0]), spacing(places[-1]))
+    side = OVERLAP * spacing(places[0])  # a splash has no spacing of its own
     low = np.nanmin(everything, axis=0) - 0.5 * side
     extent = np.nanmax(everything, axis=0) + 0.5 * side - low
 
