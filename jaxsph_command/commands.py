@@ -9,6 +9,7 @@ from importlib import import_module
 from .config import add_config_option, expanded, typed
 from .errors import Parser, report_errors
 
+_SHOW = ("a quick look at a run, at any other file, or at a folder", "jaxsph.cli.show")
 _COMPLETION = ("what lets a shell complete these words", "jaxsph_command.completion")
 # command: what it does in a line, and the module that adds its options
 COMMANDS = {
@@ -16,7 +17,7 @@ COMMANDS = {
         "scenes": ("list the scenes, or tell what one can be given", "jaxsph_command.scenes"),
         "run": ("run a full model", "jaxsph.cli.run"),
         "sweep": ("run a scene at many Reynolds numbers and seeds", "jaxsph.cli.sweep"),
-        "show": ("a quick look at a run, or at any other file of this project", "jaxsph.cli.show"),
+        "show": _SHOW,
         "export": ("write a run for ParaView", "jaxsph.cli.export"),
         "animate": ("draw a run as a moving picture", "jaxsph.cli.animate"),
         "completion": _COMPLETION,
@@ -32,6 +33,7 @@ COMMANDS = {
             "where a reduced model needs its next training run",
             "jaxsph_rom.cli.suggest",
         ),
+        "show": _SHOW,
         "advise": ("which setting to use for a wanted accuracy or time", "jaxsph_rom.cli.advise"),
         "completion": _COMPLETION,
     },

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,10 @@ from typing import Any
 from .errors import Parser
 
 NAME = "run.toml"
+_POSITIONAL = ("scene", "model", "file")
 # what says where results go and whence a run goes on, rather than what is run
-_OF_ONE_CALL = ("out", "json", "runs", "overwrite", "resume", "from_step", "from_time", "config")
+_PLACES = ("out", "json", "runs", "overwrite", "config")
+_OF_ONE_CALL = (*_PLACES, "resume", "from_step", "from_time")
 
 
 def add_config_option(parser: Parser) -> None:
@@ -68,6 +71,27 @@ def write_config(path: Path, options, **changed: Any) -> None:
     told = f"# {options.program} {options.name} --config {path.name} --out DIR runs this again"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join([told, f'command = "{options.name}"', *lines, ""]), encoding="utf-8")
+
+
+def repeating(options) -> str:
+    """The command that was given, without where its files are."""
+    words = [options.program, options.name]
+    for key, value in options.typed.items():
+        if key in _PLACES:
+            continue
+        given = value if isinstance(value, list) else [value]
+        flag = [] if key in _POSITIONAL else ["--" + key.replace("_", "-")]
+        if key == "set":
+            words += [word for item in given for word in ("--set", str(item))]
+        elif value is True or value is False:
+            words.append(flag[0] if value else flag[0].replace("--", "--no-", 1))
+        else:
+            words += [*flag, *(_without_folder(str(item)) for item in given)]
+    return shlex.join(words)
+
+
+def _without_folder(word: str) -> str:
+    return Path(word).name if os.sep in word else word
 
 
 def read_config(path: Path) -> dict[str, Any]:

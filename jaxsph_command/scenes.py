@@ -31,14 +31,36 @@ def add_to(parser: Parser, words: list[str]) -> None:
     parser.add_argument(
         "--scale", choices=SCALES, action="append", help="build scenes of these sizes"
     )
+    parser.add_argument(
+        "--json", type=_writable, metavar="FILE", help="write the results to FILE as well"
+    )
+
+
+def _writable(text: str) -> Path:
+    from jaxsph.cli.options import writable  # needs JAX
+
+    return writable(text)
 
 
 def _list_scenes(options) -> int:
     if options.scene is not None or options.scale:
         from jaxsph.cli.scenes import tell_scenes  # needs JAX
 
-        return tell_scenes(options.scene, options.scale or ())
+        told = tell_scenes(options.scene, options.scale or ())
+    else:
+        told = _listed()
+    if options.json is not None:
+        from jaxsph.cli.options import write_json
+
+        write_json(options.json, told)
+    return 0
+
+
+def _listed() -> dict[str, dict[str, Any]]:
+    """Print all scenes and their sizes; what is printed by their names."""
+    told: dict[str, dict[str, Any]] = {}
     for name, summary, scales in scenes():
+        told[name] = {"summary": summary, "sizes": scales}
         print(f"{name}: {summary}")
         for scale, size in scales.items():
             print(
@@ -46,8 +68,9 @@ def _list_scenes(options) -> int:
                 f"dt = {size['time_step']:g} s"
             )
     for point in entry_points(group=GROUP):
+        told[point.name] = {"function": point.value, "package": point.dist.name}
         print(f"{point.name}: {point.value} of {point.dist.name}")
-    return 0
+    return told
 
 
 def scenes() -> Iterator[tuple[str, str, dict[str, dict[str, Any]]]]:

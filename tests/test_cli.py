@@ -22,6 +22,7 @@ from jaxsph.environment import environment
 from jaxsph.integrate import FaultCode, SimulationError
 from jaxsph.io import TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.metrics import kinetic_energy
+from jaxsph.report.settings import CITATION
 from jaxsph.scenes import SCENES, taylor_green
 from jaxsph_command.scenes import scenes
 from tests.pages import checked_page
@@ -53,8 +54,15 @@ def test_lists_scenes(capsys):
         for table in (vars(module).get(n) for n in ("SCALES", "SCALES_3D") if n in vars(module)):
             if table["small"].resolution == sizes["small"]["resolution"]:
                 assert {k: dataclasses.asdict(v) for k, v in table.items()} == sizes
-    assert main(["scenes", "dam-break", "--scale", "small"]) == 0
+    assert main(["scenes", "--json", "new/all.json"]) == 0
+    told = json.loads(Path("new/all.json").read_text())
+    assert tuple(told) == tuple(SCENES) and told["dam-break"]["sizes"]["small"]["resolution"] > 0
+    assert main(["scenes", "dam-break", "--scale", "small", "--json", "one.json"]) == 0
     printed = capsys.readouterr().out
+    told = json.loads(Path("one.json").read_text())["dam-break"]
+    assert told["built"]["small"]["particles"] == 1800
+    assert "FreeSurface" in told["built"]["small"]["effects"]
+    assert "[m]" in told["settings"]["tank"]
     for word in ("PressureForce", "FreeSurface", "1800 particles", "column"):
         assert word in printed
 
@@ -91,7 +99,7 @@ def test_run(tmp_path, capsys):
 
 
 def test_every_run_leaves_a_page(tmp_path, capsys):
-    assert main([*TINY, "--reynolds", "50"]) == 0
+    assert main([*TINY, "--reynolds", "50", "--out", str(tmp_path / "out/taylor-green")]) == 0
     printed = capsys.readouterr().out
     assert "out/taylor-green/report.html" in printed
     page = checked_page(tmp_path / "out" / "taylor-green" / "report.html")
@@ -102,6 +110,10 @@ def test_every_run_leaves_a_page(tmp_path, capsys):
     for name in ("run", "compile", "velocity error", "kinetic energy error"):
         value = page.cells[page.cells.index(name) + 1]
         assert f"{name:22} {value}" in printed
+    assert page.cells[page.cells.index("command") + 1] == f"jaxsph {' '.join(TINY)} --reynolds 50"
+    assert re.match(r"20\d\d-\d\d-\d\d \d\d:\d\d", page.cells[page.cells.index("made") + 1])
+    assert page.cells[page.cells.index("cite") + 1] == CITATION
+    assert len(page.scripts) == 1  # the run with a slider
     assert str(tmp_path) not in page.source and platform.node() not in page.text
 
 

@@ -11,7 +11,7 @@ from ..progress import progress_bar
 from .options import add_json_option, positive_int, print_rows, write_json
 
 FRAMES = 100  # at most, unless more are asked for
-FIELDS = ("velocity", "pressure", "density")
+FIELDS = ("velocity", "pressure", "density", "vorticity")
 
 
 def add_to(parser: Parser, words: list[str]) -> None:

@@ -108,7 +108,7 @@ def result_file(out: Path | None, folder: Path, name: str) -> Path:
 def add_json_option(parser: argparse.ArgumentParser) -> None:
     """Add what every command takes that has results; `write_json` writes them."""
     parser.add_argument(
-        "--json", type=_writable, metavar="FILE", help="write the results to FILE as well"
+        "--json", type=writable, metavar="FILE", help="write the results to FILE as well"
     )
 
 
@@ -120,7 +120,7 @@ def write_json(path: Path | None, results: Mapping[str, Any]) -> None:
         path.write_text(text + "\n", encoding="utf-8")
 
 
-def _writable(text: str) -> Path:
+def writable(text: str) -> Path:
     """The path of a file that can be written."""
     try:
         check_target(text)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from jaxsph_command.config import repeating
 from jaxsph_command.errors import fail
 
 from ..environment import environment
@@ -56,7 +57,7 @@ def simulate_and_report(
             )
             writer.finish(trajectory.metadata)
     except SimulationError as error:
-        _report(scene, writer, {"fault": str(error)})
+        _report(options, scene, writer, {"fault": str(error)})
         return fail("jaxsph", f"{error} {_holds(writer)}", 1)
     except TrajectoryFileError as error:  # the disk takes no more, so no report either
         return fail("jaxsph", f"{error} {_holds(writer)}", 1)
@@ -65,15 +66,16 @@ def simulate_and_report(
     results = _results(scene, trajectory, writer.path)
     write_json(options.json, {**results, **environment()})
     rows = _rows(results)
-    print_rows({**rows, "report": str(_report(scene, writer, rows))})
+    print_rows({**rows, "report": str(_report(options, scene, writer, rows))})
     return 0
 
 
-def _report(scene: Scene, writer: TrajectoryWriter, rows: dict[str, str]) -> Path:
+def _report(options, scene: Scene, writer: TrajectoryWriter, rows: dict[str, str]) -> Path:
     from ..report.run_report import write_run_report  # matplotlib takes its time to load
 
     path, rows = writer.path.with_name(REPORT), {**rows, "trajectory": writer.path.name}
-    return write_run_report(path, writer.path, float(scene.mass), rows, environment())
+    told = float(scene.mass), rows, environment(), repeating(options)
+    return write_run_report(path, writer.path, *told)
 
 
 class _Progress:

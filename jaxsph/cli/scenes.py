@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from ..scenes import SCENES
+from ..scenes import SCENES, Scene
 from .options import print_rows
 from .scene_functions import argument_lines, made, scene_function, unpacked
 
 
-def tell_scenes(scene: str | None, scales: Sequence[str]) -> int:
+def tell_scenes(scene: str | None, scales: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Print what a scene can be given, or what it is, or all are, at some scales.
+
+    What is printed is handed back by the scenes' names, JSON-like.
 
     Args:
         scene: a name or a file with a function; all scenes if none is given.
@@ -21,24 +24,35 @@ def tell_scenes(scene: str | None, scales: Sequence[str]) -> int:
     for make in named.values() if scales else ():
         if "scale" not in inspect.signature(make).parameters:
             raise ValueError("--scale: the scene has none; leave it out.")
+    told: dict[str, dict[str, Any]] = {}
     for name, make in named.items():
         summary = (inspect.getdoc(make) or "").partition("\n\n" if scene else "\n")[0]
-        print(f"{name}: {' '.join(summary.split())}")
+        told[name] = {"summary": " ".join(summary.split())}
+        print(f"{name}: {told[name]['summary']}")
         if scene is not None:
-            print_rows({f"  {key}": line for key, line in argument_lines(make).items()})
-        for scale in scales:
-            _tell_built(make, scale)
-    return 0
+            told[name]["settings"] = argument_lines(make)
+            print_rows({f"  {key}": line for key, line in told[name]["settings"].items()})
+        if scales:
+            told[name]["built"] = {scale: _tell_built(make, scale) for scale in scales}
+    return told
 
 
-def _tell_built(make, scale: str) -> None:
+def _tell_built(make: Callable[..., Scene], scale: str) -> dict[str, Any]:
     scene = made(make, {"scale": scale, **unpacked(make)})
     if not all(scene.space.box.periodic):  # only periodic scenes pack their particles
         scene = made(make, {"scale": scale})
+    built = {
+        "particles": scene.state.position.shape[0],
+        "spacing": scene.space.spacing,
+        "h_over_dx": scene.space.smoothing_length / scene.space.spacing,
+        "time_step": scene.time_step,
+        "steps": scene.steps,
+        "end_time": scene.end_time,
+        "effects": [effect.name for effect in scene.effects],
+    }
     print(
-        f"  {scale:6} {scene.state.position.shape[0]:>7} particles, "
-        f"dx = {scene.space.spacing:.4g} m, "
-        f"h/dx = {scene.space.smoothing_length / scene.space.spacing:.3g}, "
-        f"dt = {scene.time_step:.4g} s, {scene.steps} steps to t = {scene.end_time:g} s\n"
-        f"         effects: {', '.join(effect.name for effect in scene.effects)}"
+        f"  {scale:6} {built['particles']:>7} particles, dx = {built['spacing']:.4g} m, "
+        f"h/dx = {built['h_over_dx']:.3g}, dt = {built['time_step']:.4g} s, {built['steps']} steps "
+        f"to t = {built['end_time']:g} s\n         effects: {', '.join(built['effects'])}"
     )
+    return built

@@ -1,4 +1,4 @@
-"""`jaxsph show FILE.h5`: a quick look at a run, whether it has ended or not."""
+"""`jaxsph show PATH`: a quick look at a run, whether it has ended or not, or at a folder."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..metrics import kinetic_energy
 from ..report.settings import scene_rows
 from .options import add_json_option, bytes_told, print_rows, write_json
 from .show_contents import contents, file_format
+from .show_folder import folder_contents
 from .show_other import other_contents
 
 _SAMPLES = 20  # snapshots that are read of a long run, beside the last one
@@ -25,11 +26,13 @@ def add_to(parser: Parser, words: list[str]) -> None:
     parser.description = (
         "Tell what a trajectory file holds: the scene, how far the run has come, and "
         "what its particles do. The file may still be written. Of other files that commands leave, "
-        "sweeps, models, predictions, options, results, pages and pictures, tell what is in them."
+        "sweeps, models, predictions, options, results, pages and pictures, tell what is in them. "
+        "Of a folder, tell what each file in it is and how to look at it."
     )
     parser.set_defaults(command=_show)
     add = parser.add_argument
-    add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, or another file")
+    add("file", type=Path, metavar="FILE", help="trajectory.h5 of a run, another file, or "
+        "a folder")  # fmt: skip
     add("--figure", type=Path, metavar="FILE", help="draw the last snapshot (.png, .pdf or .svg)")
     add_json_option(parser)
 
@@ -41,7 +44,8 @@ def _show(options) -> int:
     if rows is not None:
         if options.figure is not None:
             raise ValueError(f"--figure: {options.file} is no run, so there is nothing to draw.")
-        rows = {"file": f"{options.file}, {bytes_told(options.file.stat().st_size)}", **rows}
+        if not options.file.is_dir():
+            rows = {"file": f"{options.file}, {bytes_told(options.file.stat().st_size)}", **rows}
         print_rows(rows)
         write_json(options.json, rows)
         return 0
@@ -63,7 +67,9 @@ def _show(options) -> int:
 
 
 def _contents(path: Path) -> dict[str, str] | None:
-    """What is in a file that is no run; None for a run."""
+    """What is in a folder or a file that is no run; None for a run."""
+    if path.is_dir():
+        return folder_contents(path)
     rows = other_contents(path)
     if rows is None and file_format(path) not in (None, FORMAT):
         return contents(path)

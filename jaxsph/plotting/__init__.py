@@ -6,3 +6,4 @@ from .fields import ParticleField as ParticleField
 from .history import history_figure as history_figure
 from .snapshot import snapshot_figure as snapshot_figure
 from .style import save as save
+from .vorticity import vorticity as vorticity

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..trajectory import Snapshot, Trajectory
 from .style import MAGNITUDE_MAP, SIGNED_MAP
+from .vorticity import vorticity
 
 _MATTERS = 0.1  # a sign does, if it reaches so far of the way that the other one does
 
@@ -40,9 +41,18 @@ class ParticleField:
         return MAGNITUDE_MAP, (low, high)
 
 
+def _of_each(source: Snapshot | Trajectory) -> np.ndarray:
+    """Vorticity of a snapshot, or of each one of a trajectory."""
+    position, velocity = np.asarray(source.position), np.asarray(source.velocity)
+    if position.ndim == 2:
+        return vorticity(position, velocity)
+    return np.stack([vorticity(x, u) for x, u in zip(position, velocity, strict=True)])
+
+
 VELOCITY = ParticleField(
     "velocity", "velocity norm [m/s]", lambda s: np.linalg.norm(s.velocity, axis=-1)
 )
 PRESSURE = ParticleField("pressure", "pressure [Pa]", lambda s: np.asarray(s.pressure), signed=True)
 DENSITY = ParticleField("density", "density [kg/m$^3$]", lambda s: np.asarray(s.density))
-FIELDS = {field.name: field for field in (VELOCITY, PRESSURE, DENSITY)}
+VORTICITY = ParticleField("vorticity", "vorticity [1/s]", _of_each, signed=True)
+FIELDS = {field.name: field for field in (VELOCITY, PRESSURE, DENSITY, VORTICITY)}

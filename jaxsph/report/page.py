@@ -1,4 +1,4 @@
-"""One HTML file with all it shows inside: figures as data, styles inline, no script, no network.
+"""One HTML file with all it shows inside: figures as data, styles and scripts inline, no network.
 
 Each function turns plain text and numbers into a piece of HTML, escaped; `write_page` puts pieces
 together.
@@ -13,6 +13,7 @@ from html import escape
 from pathlib import Path
 
 _STYLE = """
+:root { color-scheme: light dark; }
 body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff;
        max-width: 68rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
@@ -24,6 +25,12 @@ th { font-weight: 600; } thead th { border-bottom: 2px solid #1a1a1a; vertical-a
 .number { text-align: right; } td.number { white-space: nowrap; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
 figcaption { color: #4d4d4d; }
+.film canvas { display: block; max-width: 100%; } .film p { margin: 0.2rem 0 0.6rem; }
+.film input { width: min(28rem, 60%); vertical-align: middle; margin: 0 0.6rem; }
+@media (prefers-color-scheme: dark) {
+  body { color: #e6e6e6; background: #16181c; } figcaption { color: #b3b3b3; }
+  th, td { border-color: #3a3d44; } thead th { border-color: #e6e6e6; }
+}
 """
 
 

@@ -12,7 +12,8 @@ from ..io import read_overview, read_snapshot, read_walls
 from ..plotting import history_figure, snapshot_figure
 from ..plotting.style import png
 from . import page
-from .settings import environment_rows, scene_rows
+from .film import film
+from .settings import origin_rows, scene_rows
 
 
 def write_run_report(
@@ -21,6 +22,7 @@ def write_run_report(
     mass: float,
     results: Mapping[str, str],
     environment: Mapping[str, Mapping[str, Any]],
+    command: str | None = None,
 ) -> Path:
     """Write the page of the run in a trajectory file, and return its path.
 
@@ -30,6 +32,7 @@ def write_run_report(
         mass: of a particle [kg].
         results: errors, times or what went wrong, as they are shown to people.
         environment: as `jaxsph.environment.environment` gives it.
+        command: that made it, if one did.
 
     Raises:
         TrajectoryFileError: if the trajectory file cannot be read.
@@ -41,6 +44,8 @@ def write_run_report(
         time, snapshot = read_snapshot(trajectory)
         layer = ", of the middle layer" if overview.dim == 3 else ""
         pieces += [
+            page.heading("The run"),
+            film(trajectory),
             page.heading("Figures"),
             page.figure(
                 png(snapshot_figure(time, snapshot, walls=read_walls(trajectory))),
@@ -53,5 +58,5 @@ def write_run_report(
             ),
         ]
     pieces += [page.heading("Scene and settings"), page.rows(scene_rows(overview))]
-    pieces += [page.heading("Versions and machine"), page.rows(environment_rows(environment))]
+    pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     return page.write_page(path, f"jaxsph: {overview.scene}", pieces)

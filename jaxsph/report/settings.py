@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from ..io import Overview
+from ..version import __version__
+
+CITATION = (
+    f"jaxsph {__version__}: differentiable smoothed-particle hydrodynamics and its reduced models "
+    "in JAX; and for reduced models Rodriguez et al. (2025), Meshless projection model-order "
+    "reduction via reference spaces for smoothed-particle hydrodynamics, arXiv:2507.07830"
+)
 
 
 def scene_rows(overview: Overview) -> dict[str, str]:
@@ -29,9 +37,15 @@ def parameter_rows(parameters: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def environment_rows(environment: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Versions, machine and device, a line each."""
-    return {name: _text(values) for name, values in environment.items()}
+def origin_rows(
+    environment: Mapping[str, Mapping[str, Any]], command: str | None = None
+) -> dict[str, str]:
+    """How a result came about: the command, if it was one, the time, versions, machine and device,
+    and what to cite."""
+    rows = {} if command is None else {"command": command}
+    rows["made"] = datetime.now().astimezone().isoformat(" ", "minutes")
+    rows |= {name: _text(values) for name, values in environment.items()}
+    return {**rows, "cite": CITATION}
 
 
 def _text(value: Any) -> str:

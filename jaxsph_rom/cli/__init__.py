@@ -1,4 +1,4 @@
-"""The command line: `jaxsph-rom run`, `train`, `predict` and `advise`."""
+"""The command line: `jaxsph-rom run`, `train`, `predict`, `suggest`, `show` and `advise`."""
 
 from .main import main as main
 from .options import PRODUCTS as PRODUCTS

@@ -6,7 +6,6 @@ import math
 import sys
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -16,32 +15,33 @@ from jaxsph.cli import (
     fail,
     positive_float,
     positive_int,
-    print_rows,
     reynolds_numbers,
     seed,
 )
 from jaxsph.cli.options import MOST_NUMBERS, add_json_option, write_json
 from jaxsph.environment import environment
-from jaxsph.integrate import SimulationError, explanation
+from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
+from jaxsph_command.config import repeating
 
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
 from .options import bar, by_name, named_numbers, said
-from .train import print_errors
+from .predicted import print_prediction, results_of, write_report
 
 _MOST_FILES = 100  # with fields or tracers
 _MOST_BYTES = 4 * 2**30  # of all coordinates
-_FAULTS_SHOWN = 5
 _MEMBERS_IN = ("fields", "tracers")  # folders beside prediction.h5
+_REPORTS = ("report.html", "report.json")
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
     """Add the command's options to its parser."""
     parser.description = (
         "Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
-        "of parameters at once, and write their coordinates over time to DIR/prediction.h5. Those "
-        "of an earlier prediction in DIR are removed, with its fields and tracers."
+        "of parameters at once, and write their coordinates over time to DIR/prediction.h5, "
+        "with a page that tells of them, DIR/report.html, and its numbers, report.json. Those of "
+        "an earlier prediction in DIR are removed, with its fields and tracers."
     )
     parser.set_defaults(command=_predict)
     add = parser.add_argument
@@ -82,9 +82,11 @@ def _predict(options) -> int:
         _remove_earlier(folder)
         save_prediction(path, prediction, options.model.name)
         lost = _write_members(options, trained, prediction, folder)
-    results = _results(options, trained, prediction, path)
+    results = results_of(trained, prediction, options.model, path)
     write_json(options.json, {**results, **environment()})
-    _print(results, trained, prediction)
+    page = write_report(folder, results, trained, prediction, repeating(options))
+    print_prediction(results, trained, prediction)
+    print(f"\nreport: {page}, {page.with_suffix('.json')}")
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
 
@@ -157,7 +159,9 @@ def _said(prediction: Prediction, member: int) -> str:
 
 
 def _remove_earlier(folder: Path) -> None:
-    """Take away the members of an earlier prediction, which would stand beside this one's."""
+    """Take away what an earlier prediction left, which would stand beside this one's."""
+    for name in _REPORTS:
+        (folder / name).unlink(missing_ok=True)
     for name in _MEMBERS_IN:
         for pattern in ("re-*.h5", "member-*.h5", "re-*.vtkhdf", "member-*.vtkhdf"):
             for file in (folder / name).glob(pattern):
@@ -194,73 +198,3 @@ def _write_members(options, trained: TrainedModel, prediction: Prediction, folde
         except SimulationError as error:
             lost = lost or f"{label}: {error}"
     return lost
-
-
-def _results(options, trained: TrainedModel, prediction: Prediction, path: Path) -> dict[str, Any]:
-    lost = np.flatnonzero(prediction.status)
-    return {
-        "model": options.model,
-        "scene": trained.scene,
-        "modes": trained.flow.basis.size,
-        "training": trained.training,
-        "members": len(prediction),
-        "lowest": dict(zip(prediction.names, prediction.points.min(axis=0), strict=True)),
-        "highest": dict(zip(prediction.names, prediction.points.max(axis=0), strict=True)),
-        "outside": int(prediction.outside.sum()),
-        "start": prediction.start,
-        "operators": prediction.operators,
-        "error_indicator_percent": _percent(prediction),
-        "end_time": prediction.time[-1],
-        "steps": (len(prediction.time) - 1) * trained.schedule.steps_per_snapshot,
-        "run_seconds": prediction.run_seconds,
-        "compile_seconds": prediction.compile_seconds,
-        "stable": len(prediction) - len(lost),
-        "faults": [
-            {
-                "parameters": {n: v[k] for n, v in prediction.parameters.items()},
-                "step": prediction.step[k],
-                "fault": explanation(prediction.status[k]),
-            }
-            for k in lost[:_MOST_FILES]
-        ],
-        "prediction": path,
-    }
-
-
-def _percent(prediction: Prediction) -> dict[str, float] | None:
-    """Median and largest expected error of members that are not lost."""
-    found = 100.0 * prediction.error_indicator[np.isfinite(prediction.error_indicator)]
-    if not len(found):
-        return None
-    return {"median": float(np.median(found)), "largest": float(found.max())}
-
-
-def _print(results: dict[str, Any], trained: TrainedModel, prediction: Prediction) -> None:
-    count, made, expected = len(prediction), trained.training, results["error_indicator_percent"]
-    rows = {
-        "model": f"{results['scene']}, M = {results['modes']}, {made['reduction']}, closure "
-        f"{made['closure']}",
-        "trained on": "; ".join(said(named) for named in reversed(made["trained_on"]))
-        + f", to t = {trained.schedule.end_time:g} s",
-    }
-    for name, values in prediction.parameters.items():
-        title = "Reynolds numbers" if name == "reynolds" else name
-        low, high, some = values.min(), values.max(), len(np.unique(values))
-        rows[title] = f"{some}, {low:g} to {high:g}" if some > 1 else f"{low:g}"
-    rows |= {
-        "steps": f"{results['steps']}, to t = {results['end_time']:g} s",
-        "start": results["start"],
-        "run": f"{results['run_seconds']:.3g} s",
-        "compile": f"{results['compile_seconds']:.3g} s",
-        "stable": f"{results['stable']} of {count}",
-        "outside": f"{results['outside']} of {count}",
-        "expected error": "unknown" if expected is None else f"{expected['median']:.2g} % of "
-        f"velocity in the median, {expected['largest']:.2g} % at most",
-        "prediction": str(results["prediction"]),
-    }
-    print_rows(rows)
-    for fault in results["faults"][:_FAULTS_SHOWN]:
-        print(f"  {said(fault['parameters'])}, step {fault['step']}: {fault['fault']}")
-    if len(results["faults"]) > _FAULTS_SHOWN:
-        print("  and more; prediction.h5 tells the status of each")
-    print_errors(made)

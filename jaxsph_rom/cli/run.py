@@ -16,7 +16,7 @@ from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import MovingLeastSquaresMap, QuadraticMap, ShepardMap
 from jaxsph.io import check_target
 from jaxsph.scenes import Scene
-from jaxsph_command.config import NAME, write_config
+from jaxsph_command.config import NAME, repeating, write_config
 
 from ..field_advection import ConsistentAdvection, Gauged, ModeAdvection, PaperAdvection
 from ..lattice_polynomials import LatticePolynomials
@@ -110,7 +110,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--spline-order", type=positive_int, default=3, metavar="K",
         help="of the splines or polynomials (default: %(default)s)")  # fmt: skip
     add_closure_options(add, default=None)
-    add("--slice", type=float, dest="slice_at", metavar="X",
+    add("--slice", type=float, metavar="X",
         help="compare on the vertical line at x = X [m] (default: the centre line; open-cavity "
         "0.25)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
@@ -153,7 +153,7 @@ def _run(options) -> int:
         except KeyboardInterrupt:
             return fail("jaxsph-rom", "interrupted; the same command goes on from here.", 130)
         write_config(folder / NAME, options)
-        write_study(study, experiments, outcomes, folder)
+        write_study(study, experiments, outcomes, folder, command=repeating(options))
     if options.json is not None:
         write_json(options.json, json.loads(report.read_text()))
     print(format_table([outcome.case for outcome in outcomes]))
@@ -191,9 +191,9 @@ def _plan(options) -> Plan:
         for name in ("predict", "modes", "borders")
         if getattr(options, name) is not None
     }
-    for name in ("slice_at", "settling"):
-        if getattr(options, name) is not None:
-            given[name] = getattr(options, name)
+    for name, option in (("slice_at", "slice"), ("settling", "settling")):
+        if getattr(options, option) is not None:
+            given[name] = getattr(options, option)
     values = trained_at(options)
     if values is not None:
         if set(values) != {"reynolds"}:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import textwrap
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -52,6 +54,10 @@ from .options import (
     trained_at,
 )
 
+ERRORS_TOLD = (
+    "percent discrepancy over the reference points on the training runs, peak and median over time "
+    "(in brackets that of the projection, the floor of any model)"
+)
 REDUCTIONS = {"tensors": Tensors(), "samples": Samples()}
 
 
@@ -203,16 +209,28 @@ def _print(trained: TrainedModel, particles: int, path: Path, folder: Path) -> N
 
 def print_errors(training: dict[str, Any]) -> None:
     """What a model gets wrong on the runs that it was trained on."""
-    print("\npercent discrepancy over the reference points on the training runs, peak and median\n"
-          "over time (in brackets that of the projection, the floor of any model):")  # fmt: skip
+    print("\n" + "\n".join(textwrap.wrap(f"{ERRORS_TOLD}:", 100)))
+    for line in error_lines(training):
+        print(f"  {line}")
+
+
+def error_lines(training: dict[str, Any]) -> Iterator[str]:
+    """Of each training run what the model gets wrong."""
     for row in reversed(training["runs"]):
         error, floor = row["errors"], row["floor"]
         if isinstance(error, str):
-            print(f"  {said(row['parameters'])}: {error}")
+            yield f"{said(row['parameters'])}: {error}"
             continue
-        cells = [
-            f"{name} {error[f'{name}_peak_percent']:.3g} ({floor[f'{name}_peak_percent']:.3g}), "
-            f"{error[f'{name}_median_percent']:.3g} ({floor[f'{name}_median_percent']:.3g})"
-            for name in ("velocity", "pressure")
-        ]
-        print(f"  {said(row['parameters'])}: {'; '.join(cells)}")
+        velocity = _told("velocity", "percent", error, floor)
+        if error["pressure_peak_percent"] is None:
+            pressure = f"{_told('pressure', 'pascal', error, floor)} Pa, which is uniform"
+        else:
+            pressure = _told("pressure", "percent", error, floor)
+        yield f"{said(row['parameters'])}: {velocity}; {pressure}"
+
+
+def _told(name: str, unit: str, error: dict[str, float], floor: dict[str, float]) -> str:
+    return ", ".join(
+        f"{what}{error[key]:.3g} ({floor[key]:.3g})"
+        for what, key in ((f"{name} ", f"{name}_peak_{unit}"), ("", f"{name}_median_{unit}"))
+    )

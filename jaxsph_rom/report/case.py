@@ -27,7 +27,8 @@ class Case:
         trained_on: Reynolds numbers whose snapshots made the basis.
         velocity_peak_percent, velocity_median_percent: relative discrepancy of the velocity norm,
             largest and median over time [%].
-        pressure_peak_percent, pressure_median_percent: the same of the pressure [%].
+        pressure_peak_percent, pressure_median_percent: the same of the pressure [%]; None where
+            it is uniform but for particles' noise, and has no range that an error is relative to.
         stable: whether the run reached its end with bounded fields and nothing to doubt.
         fom_seconds, rom_seconds: wall-clock time of the full and the reduced run without
             compilation [s].
@@ -42,6 +43,8 @@ class Case:
         fault_time: simulated time at which it failed [s], or None.
         doubt: why it is not to be believed though it went on, or None.
         doubt_time: simulated time from which on that is so [s], or None.
+        pressure_peak_pascal, pressure_median_pascal: mean absolute discrepancy of the pressure over
+            the places, largest and median over time [Pa].
     """
 
     scene: str
@@ -71,12 +74,19 @@ class Case:
     fault_time: float | None = None
     doubt: str | None = None
     doubt_time: float | None = None
+    pressure_peak_pascal: float | None = None
+    pressure_median_pascal: float | None = None
 
     @property
     def sound(self) -> bool:
         """`stable`, and no value is NaN or infinite."""
         values = (getattr(self, field.name) for field in dataclasses.fields(self))
         return bool(self.stable) and all(map(_finite, values))
+
+    @property
+    def uniform_pressure(self) -> bool:
+        """Whether there was no pressure to compare with; its discrepancy in pascal is there."""
+        return self.pressure_peak_percent is None and self.pressure_peak_pascal is not None
 
     @property
     def predicted(self) -> bool:

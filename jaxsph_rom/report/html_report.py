@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from jaxsph.report import page
-from jaxsph.report.settings import environment_rows, parameter_rows
+from jaxsph.report.settings import origin_rows, parameter_rows
 
 from .case import Case
-from .table import COLUMNS, cells, heading, wrong
+from .table import COLUMNS, cells, heading, remarks
 from .verdict import verdict
 
 FILE_NAME = "report.html"
@@ -30,6 +30,7 @@ def write_html_report(
     figures: Sequence[Shown],
     settings: Mapping[str, Any],
     environment: Mapping[str, Mapping[str, Any]],
+    command: str | None = None,
 ) -> Path:
     """Write the cases and their figures as one self-contained page, and return its path.
 
@@ -39,6 +40,7 @@ def write_html_report(
         figures: PNG files, which the page takes in, and what each shows.
         settings: that all runs share, JSON-like.
         environment: as `jaxsph.environment.environment` gives it.
+        command: that made it, if one did.
 
     Raises:
         ValueError: if there are no cases.
@@ -49,7 +51,7 @@ def write_html_report(
     numbers = [column[2] == ">" for column in COLUMNS]
     for name, group in itertools.groupby(cases, key=heading):
         pieces += [page.paragraph(name), page.table(_NAMES, map(cells, group), numbers)]
-    pieces += map(page.paragraph, wrong(cases))
+    pieces += map(page.paragraph, remarks(cases))
     pieces += map(page.paragraph, verdict(cases))
     pieces.append(
         page.paragraph(
@@ -60,5 +62,5 @@ def write_html_report(
     pieces.append(page.heading("Figures"))
     pieces += [page.figure(file.read_bytes(), caption) for file, caption in figures]
     pieces += [page.heading("Scene and settings"), page.rows(parameter_rows(settings))]
-    pieces += [page.heading("Versions and machine"), page.rows(environment_rows(environment))]
+    pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     return page.write_page(path, f"jaxsph-rom: {cases[0].scene}", pieces)

@@ -39,7 +39,7 @@ def format_table(cases: Sequence[Case]) -> str:
     Every row holds the errors (percent relative discrepancy, peak and median over time) and the
     times (wall clock without compilation) of one case, so that neither is read without the other.
     A line names the scene, the inner product and the hyper-reduction where they change. What
-    made a run unstable or doubtful stands below the table.
+    made a run unstable or doubtful, and how far off a pressure is that is uniform, stands below.
 
     Args:
         cases: the cases to show.
@@ -68,7 +68,7 @@ def format_table(cases: Sequence[Case]) -> str:
     rows = zip(cases, body, strict=True)
     for name, group in itertools.groupby(rows, key=lambda row: heading(row[0])):
         lines += [*textwrap.wrap(name, WIDTH), *(line(texts) for _, texts in group)]
-    for text in wrong(cases):
+    for text in remarks(cases):
         lines += textwrap.wrap(text, WIDTH, subsequent_indent="    ")
     return "\n".join(lines)
 
@@ -125,12 +125,22 @@ def heading(case: Case) -> str:
     return f"{case.scene}: {case.inner_product} inner product, hyper-reduction {case.hyper}"
 
 
-def wrong(cases: Sequence[Case]) -> list[str]:
-    """What made cases unstable or doubtful, each once."""
+def remarks(cases: Sequence[Case]) -> list[str]:
+    """What made cases unstable or doubtful, and of pressures without a percentage, each once."""
     said = [(case, text) for case in cases for text in (case.doubt, case.fault) if text]
+    said += [(case, off(case)) for case in cases if case.uniform_pressure]
     return list(
         dict.fromkeys(
             f"Re {case.reynolds:g}, M {case.modes}, {case.projection}: {text}"
             for case, text in said
         )
+    )
+
+
+def off(case: Case) -> str:
+    """How far off a pressure is that is uniform."""
+    peak, median = case.pressure_peak_pascal, case.pressure_median_pascal
+    return (
+        f"no pressure to compare with (uniform), off by {peak:.2g} Pa at most, "
+        f"{median:.2g} Pa in the median"
     )

@@ -63,17 +63,21 @@ def _sentence(model: Sequence[Case]) -> str:
     if not _sound(model):
         failed = ", ".join(f"{case.reynolds:g}" for case in judged if not case.sound)
         return f"{told}no sound run at Re {failed}."
-    errors = [
-        f"{name} within {_worst(model, f'{name}_peak'):.2g} % "
-        f"({_worst(model, f'{name}_median'):.2g} % in the median over time)"
-        for name in ("velocity", "pressure")
-    ]
+    errors = [_within(judged, name) for name in ("velocity", "pressure")]
     ratios = [case.time_ratio for case in judged if case.time_ratio is not None]
     if not ratios:
         return f"{told}{', '.join(errors)}; its time was not measured."
     ratio = statistics.median(ratios)
     times = f"{_rounded(ratio)} times faster" if ratio >= 1.0 else f"{1 / ratio:.2g} times slower"
     return f"{told}{times} than the full model, {', '.join(errors)}. {_paid(model)}"
+
+
+def _within(judged: Sequence[Case], name: str) -> str:
+    if name == "pressure" and all(case.uniform_pressure for case in judged):
+        worst = max(case.pressure_peak_pascal for case in judged)
+        return f"no pressure to compare with (off by {worst:.2g} Pa)"
+    peak, median = (_worst(judged, f"{name}_{of}") for of in ("peak", "median"))
+    return f"{name} within {peak:.2g} % ({median:.2g} % in the median over time)"
 
 
 def _name(case: Case) -> str:

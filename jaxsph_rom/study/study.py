@@ -13,6 +13,7 @@ from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
 from ..points import TrainedModel
+from ..pressure_noise import is_noise
 from ..report import Case
 from .full_runs import FullRuns
 from .method import Experiment, Method, ModelBasis, ReducedRun
@@ -28,7 +29,8 @@ class Outcome:
 
     Args:
         case: errors and times.
-        time, velocity_percent, pressure_percent: discrepancy on the probes over time (S,).
+        time, velocity_percent, pressure_percent: discrepancy on the probes over time (S,); no
+            number of a pressure that is uniform but for noise.
         trajectory: of the reduced model, as far as it came.
         profile: velocity norm and pressure on the probes over time, each (S, P).
         made_of: tells what the model is made of.
@@ -104,14 +106,20 @@ class Study:
         truth = tuple(a[: len(time)] for a in self.runs.profile(run.reynolds))
         percent = [_percent(a, b) for a, b in zip(truth, run.profile, strict=True)]
         judged, fault = time >= min(self.judged_from, time[-1]), run.fault
+        apart = np.abs(truth[1] - run.profile[1]).mean(axis=1)[judged]
+        uniform = is_noise(truth[1], scene.fluid)
+        if uniform:
+            percent[1] = np.full(len(time), np.nan)
         case = Case(
             scene=scene.name,
             reynolds=run.reynolds,
             inner_product=method.product_name.lower(),
             velocity_peak_percent=float(percent[0][judged].max()),
             velocity_median_percent=float(np.median(percent[0][judged])),
-            pressure_peak_percent=float(percent[1][judged].max()),
-            pressure_median_percent=float(np.median(percent[1][judged])),
+            pressure_peak_percent=None if uniform else float(percent[1][judged].max()),
+            pressure_median_percent=None if uniform else float(np.median(percent[1][judged])),
+            pressure_peak_pascal=float(apart.max()),
+            pressure_median_pascal=float(np.median(apart)),
             stable=fault is None and "doubt" not in run.told,
             fom_seconds=self.runs.seconds(run.reynolds),
             training_seconds=sum(map(self.runs.seconds, run.told["trained_on"])),

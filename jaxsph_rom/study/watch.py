@@ -12,9 +12,9 @@ from jaxtyping import Float
 from jaxsph import Fluid, Snapshot
 
 from ..basis import Basis
+from ..pressure_noise import pressure_noise
 
 OFF = 100.0  # percent: a pressure that is off by its own range says nothing
-_UNIFORM = 0.01  # times rho0 U^2: a range below that is particles' noise
 
 
 @final
@@ -50,7 +50,7 @@ class TrainedPressure:
         """From the times of training runs and their snapshots on the reference points."""
         modes = np.asarray(basis.modes) * np.asarray(basis.weights)[:, None]
         flat, made = modes.reshape(-1, modes.shape[2]), []
-        least = _UNIFORM * float(fluid.reference_density) * float(fluid.reference_speed) ** 2
+        least = pressure_noise(fluid)
         for time, snapshots in runs:
             away = snapshots - np.asarray(basis.centre)[:, :, None]
             spread = np.ptp(np.asarray(fluid.pressure(snapshots[:, 0])), axis=0)

@@ -47,6 +47,7 @@ def write_study(
     outcomes: Sequence[Outcome],
     folder: Path,
     profile_time: float | None = None,
+    command: str | None = None,
 ) -> dict[str, Any]:
     """Write the figures of a study, `report.json`, `report.html` and `model.h5` into a folder.
 
@@ -60,6 +61,7 @@ def write_study(
         outcomes: of all experiments.
         folder: where all of them go.
         profile_time: at which profiles and fields are shown [s]; half the run if none is given.
+        command: that made the study, if one did.
 
     Returns:
         what the report holds beside its cases.
@@ -105,7 +107,7 @@ def write_study(
     write_report(folder / "report.json", cases, made_on, extra)
     told = {**first.parameters, **{name: extra[name] for name in _SETTINGS if name in extra}}
     told.pop("reynolds", None)  # each case has its own
-    write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on)
+    write_html_report(folder / "report.html", cases, shown + basis_figures, told, made_on, command)
     on_points = [outcome for outcome in outcomes if outcome.model is not None]
     if on_points:
         chosen = best([outcome.case for outcome in on_points])[0]

@@ -215,6 +215,10 @@ REDUCED = {
     "advise taylor-green --time-budget 3fortnights": "--time-budget",
     "advise taylor-green --time-budget 3s --table text": "no table of measurements",
     "advise taylor-green --velocity-error 1% --json folder": "is a folder",
+    # show
+    "show": "FILE",
+    "show missing.h5": "no such file",
+    "show model.h5 --figure f.png": "is no run",
 }
 ALL = [(p, *case) for p, of in (("jaxsph", FULL), ("jaxsph-rom", REDUCED)) for case in of.items()]
 

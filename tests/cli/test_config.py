@@ -57,6 +57,7 @@ def test_a_run_is_repeated_by_what_it_leaves(tmp_path):
                     "--alpha=1e-3", "--seed", "3"]),
         ("jaxsph", ["sweep", "taylor-green", "--reynolds", "100:200:3", "400"]),
         ("jaxsph-rom", ["train", "taylor-green", "--train", "100", "mach=0.1,0.2"]),
+        ("jaxsph-rom", ["run", "open-cavity", "--slice", "0.2"]),
         ("jaxsph-rom", ["run", "taylor-green", "--gauge", "--predict", "150", "--tau", "auto"]),
     ],
 )  # fmt: skip

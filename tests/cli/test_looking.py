@@ -18,6 +18,7 @@ from jaxsph.io import TrajectoryWriter, read_trajectory
 from jaxsph.plotting import FIELDS as DRAWN
 from jaxsph.sweeps import sweep_file
 from jaxsph.trajectory import Snapshot
+from jaxsph_rom.cli import main as reduced_main
 from jaxsph_rom.points.files.whole_file import write_whole
 from tests.runs import random_run
 
@@ -145,6 +146,37 @@ def test_show_of_what_a_run_leaves(capsys):
     rows = shown(capsys)
     assert rows["cases.0.re"] == "0" and rows["cases"] == "5 in all"
     assert rows["cases.2.errors"] == "40 values" and rows["nothing"] == "None"
+
+
+def test_show_of_a_folder(capsys):
+    Path("empty").mkdir()
+    assert main(["show", "empty"]) == 2
+    assert "empty folder" in capsys.readouterr().err
+    random_run("a/full/re-100/t.h5", count=3)
+    random_run("a/t.h5", finish=True)
+    layout = {"starts": ("runs modes", "coordinate")}
+    write_whole("a/m.h5", ("jaxsph reduced flow", 1), layout, {"starts": np.ones((2, 3))}, {})
+    for name in ("notes.txt", "report.html", ".hidden"):
+        Path("a", name).write_text("<title>x</title>")
+    for program in (main, reduced_main):
+        assert program(["show", "a", "--json", "shown.json"]) == 0
+        rows = shown(capsys)
+        assert list(rows) == ["m.h5", "notes.txt", "report.html", "t.h5", "full/"]
+        assert json.loads(Path("shown.json").read_text()) == rows
+    assert rows["t.h5"].startswith("a run of taylor-green, 5 snapshots, complete, ")
+    assert rows["t.h5"].endswith(": jaxsph animate a/t.h5")
+    assert rows["m.h5"].startswith("a reduced model, ")
+    assert rows["m.h5"].endswith(": jaxsph-rom predict a/m.h5")
+    assert rows["notes.txt"] == "not a file of this project, 16 B"
+    assert rows["full/"].startswith("1 file, ") and rows["full/"].endswith(": jaxsph show a/full")
+    Path("a/t.h5").write_bytes(Path("a/t.h5").read_bytes()[:3000])  # cut off
+    assert main(["show", "a"]) == 0
+    assert main(["show", "a", "--figure", "f.png"]) == 2
+    for number in range(45):
+        Path("empty", f"{number}.png").touch()
+    capsys.readouterr()
+    assert main(["show", "empty"]) == 0
+    assert shown(capsys)["and"] == "5 more"
 
 
 def test_sizes():

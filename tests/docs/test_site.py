@@ -2,9 +2,12 @@
 
 import html
 import importlib
+import inspect
+import json
 import os
 import pkgutil
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +17,8 @@ import pytest
 
 import jaxsph
 import jaxsph_rom
+from jaxsph.scenes import SCENES
+from tests.report.test_browser import BROWSER
 
 ROOT = Path(__file__).parents[2]
 
@@ -83,6 +88,61 @@ def test_nothing_is_fetched_while_reading(site):
     loads = re.compile(r'<(?:script|img|iframe|link rel="(?:stylesheet|preconnect|icon)")[^>]*//')
     for page in site.rglob("*.html"):
         assert not loads.search(page.read_text()), page.name
+
+
+def test_every_scene_has_its_page(site):
+    index = (site / "scenes/index.html").read_text()
+    measured = 0
+    for name, make in SCENES.items():
+        text = (site / f"scenes/{name}.html").read_text()
+        plain = html.unescape(re.sub(r"<[^>]+>", "", text))
+        assert f'href="{name}.html"' in index
+        assert make.__doc__.partition("\n")[0].replace("`", "").rstrip(":.") in plain
+        assert f"jaxsph run {name}" in plain
+        options = set(re.findall(r"<td><code>(--[a-z0-9-]+)", text))
+        own = inspect.signature(make).parameters.keys() - {"dtype", "end_time"}
+        assert options >= {"--t-end", *("--" + key.replace("_", "-") for key in own)}
+        for figure in re.findall(r'src="(\.\./figures/[\w.-]+)"', text):
+            assert (site / "scenes" / figure).exists()
+        measured += f"measured_{name}.png" in text
+    assert measured >= 14
+
+
+def test_every_notebook_has_its_page(site):
+    for notebook in (ROOT / "notebooks").glob("*.ipynb"):
+        page = html.unescape((site / f"notebooks/{notebook.stem}.html").read_text())
+        shown = [f"notebooks/{name}" for name in re.findall(r'src="([\w]+\.png)"', page)]
+        assert len(shown) == notebook.read_text().count('"image/png"') > 0
+        assert all((site / name).read_bytes().startswith(b"\x89PNG") for name in shown)
+
+
+def test_search_is_there_when_a_page_is_opened_from_a_folder(site):
+    for page in ("index.html", "scenes/dam-break.html"):
+        assert "js/iframe-worker.js" in (site / page).read_text()  # workers need a server else
+    stored = (site / "search/search_index.js").read_text()
+    assert stored.startswith("var __index = {") and len(stored) > 1e5
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+def test_search_finds(site):
+    command = ["node", str(ROOT / "tests/docs/search.js"), str(site)]
+    command += ["dam break", "stability limit", "qqzzqq"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    break_, limit, nothing = map(json.loads, done.stdout.splitlines())
+    assert any(place.startswith("scenes/dam-break.html") for place in break_)
+    assert any(place.startswith("faq.html") for place in limit)
+    assert nothing == []
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser here")
+def test_a_browser_searches_a_folder(site, tmp_path):
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu",
+               f"--user-data-dir={tmp_path / 'profile'}", "--host-resolver-rules=MAP * ~NOTFOUND",
+               "--virtual-time-budget=20000", "--dump-dom",
+               f"{(site / 'index.html').as_uri()}?q=viscosity"]  # fmt: skip
+    shown = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    assert int(re.search(r"(\d+) matching documents", shown)[1]) > 10
+    assert "equations/consistent.html" in shown
 
 
 def test_every_table_and_figure_of_a_page_is_on_the_site(site):

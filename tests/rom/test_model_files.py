@@ -1,6 +1,7 @@
 """`jaxsph-rom train` and `predict`: a model as a file, and one clear line for bad input."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -10,6 +11,7 @@ from jaxsph.cli import main as look
 from jaxsph.io import read_trajectory
 from jaxsph_rom.cli import main
 from jaxsph_rom.points import load, load_prediction
+from tests.pages import checked_page
 
 TRAIN = ["train", "taylor-green", "--resolution", "24", "--t-end", "0.05", "--modes", "2"]
 
@@ -22,6 +24,9 @@ def folder(tmp_path_factory):
     arguments += ["--runs", str(folder), "--out", str(folder / "model.h5")]
     assert main([*arguments, "--json", str(folder / "train.json")]) == 0
     return folder
+
+
+REPORT = ("prediction.h5", "report.html", "report.json")
 
 
 def predict(folder, *arguments):
@@ -54,17 +59,19 @@ def test_nothing_of_an_earlier_prediction_stays_beside_a_new_one(folder, tmp_pat
     here = ["--out", str(tmp_path)]
     assert predict(folder, "--reynolds", "110", "120", "--fields", "--tracers", "9", *here) == 0
     before = there()
-    assert before == {"prediction.h5", *(f"{kind}/re-{number}.h5" for number in (110, 120)
+    assert before == {*REPORT, *(f"{kind}/re-{number}.h5" for number in (110, 120)
                                          for kind in ("fields", "tracers"))}  # fmt: skip
     (tmp_path / "fields" / "notes.txt").write_text("mine")  # no file of a prediction
     # one that is refused takes nothing away
     assert predict(folder, "--reynolds", "110", "--t-end", "0.012", *here) == 2
     assert there() == before | {"fields/notes.txt"}
     assert predict(folder, "--reynolds", "130", "--fields", *here) == 0
-    assert there() == {"prediction.h5", "fields/re-130.h5", "fields/notes.txt"}
+    assert there() == {*REPORT, "fields/re-130.h5", "fields/notes.txt"}
+    told = json.loads((tmp_path / "report.json").read_text())
+    assert told["lowest"] == told["highest"] == {"reynolds": 130.0}
     assert not (tmp_path / "tracers").exists()
     assert predict(folder, "--reynolds", "130", *here) == 0
-    assert there() == {"prediction.h5", "fields/notes.txt"}
+    assert there() == {*REPORT, "fields/notes.txt"}
 
 
 def test_a_sweep_from_one_line(folder, tmp_path, capsys):
@@ -89,7 +96,15 @@ def test_a_sweep_from_one_line(folder, tmp_path, capsys):
     assert (np.diff(kept) > 0).all() and (kept < 1).all()
     exact = np.exp(-16 * np.pi**2 / numbers[1:] * found.time[-1])
     np.testing.assert_allclose(np.log(kept), np.log(exact), rtol=0.1)  # 24 x 24 particles
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["p.json", "prediction.h5"]
+    assert {p.name for p in tmp_path.iterdir()} == {"p.json", *REPORT}
+    assert json.loads((tmp_path / "report.json").read_text()) == read
+    page = checked_page(tmp_path / "report.html")
+    assert len(page.figures) == 2  # the last fields of the first, and errors over the numbers
+    assert f"report: {tmp_path / 'report.html'}" in captured.out
+    row = page.cells.index("ended") + 1
+    assert page.cells[row] == "110" and page.cells[row + 1 : row + 4 : 2] == ["no", "whole"]
+    for line in re.findall("Re .*: velocity .*", captured.out):
+        assert line in page.text
 
 
 def test_fields_and_tracers_as_trajectories(folder, tmp_path, capsys):

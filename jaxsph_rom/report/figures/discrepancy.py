@@ -20,7 +20,8 @@ History = tuple[str, np.ndarray, np.ndarray, np.ndarray]
 def discrepancy_history(histories: Sequence[History], path: str | os.PathLike[str]) -> Path:
     """Percent relative discrepancy over time, velocity left and pressure right.
 
-    A run that ends before its time does (NaN, infinity, above 10^4 percent) has a cross there.
+    A run that ends before its time does (NaN, infinity, above 10^4 percent) has a cross there. A
+    panel without a number says that there was nothing to compare with.
 
     Args:
         histories: label, time (S,) [s], velocity (S,) [%] and pressure (S,) [%] of each run.
@@ -33,6 +34,9 @@ def discrepancy_history(histories: Sequence[History], path: str | os.PathLike[st
         for number, history in enumerate(histories):
             _draw(axes, number, history[0], np.asarray(history[1]), np.asarray(history[column]))
         _scale(axes, [np.asarray(history[column]) for history in histories])
+        if not any(np.isfinite(history[column]).any() for history in histories):
+            axes.text(0.5, 0.5, "uniform: nothing to compare with", ha="center", va="center",
+                      transform=axes.transAxes)  # fmt: skip
     legend_below(figure, panels[0].get_lines()[: len(histories)])
     return save(figure, path)
 
