@@ -18,6 +18,7 @@ COMMANDS = {
         "run": ("run a full model", "jaxsph.cli.run"),
         "sweep": ("run a scene at many Reynolds numbers and seeds", "jaxsph.cli.sweep"),
         "show": _SHOW,
+        "watch": ("a page on this machine that follows a running file", "jaxsph.cli.watch"),
         "export": ("write a run for ParaView", "jaxsph.cli.export"),
         "animate": ("draw a run as a moving picture", "jaxsph.cli.animate"),
         "completion": _COMPLETION,

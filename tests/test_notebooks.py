@@ -21,9 +21,12 @@ CHECKS = {
     "10_memory_and_closure_learnt": ("ratio", 0.9, "of misfits, last to first; measured 0.79"),
     "11_optimise_on_the_reduced_model": ("error", 0.02, "of the viscosity; measured 0.005"),
     "12_a_reduced_model_of_your_own": ("error", 0.01, "of velocity, median; measured 0.009"),
+    "13_a_dam_break_and_its_experiment": ("error", 0.04, "of the front, mean; measured 0.030"),
+    "14_a_flow_in_three_dimensions": ("error", 0.02, "of the energy; measured 0.013"),
 }
-# tests/benchmarks/test_inverse.py and tests/rom/points/training have these problems, at small size
-SLOW = (5, 8, 9, 10, 11, 12)
+# tests/benchmarks/test_inverse.py, tests/rom/points/training, tests/scenes/test_free_flows.py and
+# tests/io/test_vtkhdf.py have these problems, at small size
+SLOW = (5, 8, 9, 10, 11, 12, 13, 14)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The command line: `jaxsph scenes`, `run`, `sweep`, `show`, `export` and `animate`."""
+"""The command line: `jaxsph scenes`, `run`, `sweep`, `show`, `watch`, `export` and `animate`."""
 
 from jaxsph_command.errors import Parser as Parser
 from jaxsph_command.errors import fail as fail

@@ -50,8 +50,8 @@ def _show(options) -> int:
         write_json(options.json, rows)
         return 0
     overview = read_overview(options.file)
-    measures = _measures(options.file, overview)
-    rows = {"file": f"{options.file}, {bytes_told(overview.size)}", **_rows(overview, measures)}
+    measures = measures_of(options.file, overview)
+    rows = {"file": f"{options.file}, {bytes_told(overview.size)}", **rows_of(overview, measures)}
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
@@ -76,7 +76,7 @@ def _contents(path: Path) -> dict[str, str] | None:
     return rows
 
 
-def _measures(path: Path, overview: Overview) -> dict[str, Any]:
+def measures_of(path: Path, overview: Overview) -> dict[str, Any]:
     """Energies, densities and speeds, JSON-like; of a long run, those of some snapshots."""
     if not overview.snapshots:
         return {}
@@ -98,7 +98,8 @@ def _measures(path: Path, overview: Overview) -> dict[str, Any]:
     return measures
 
 
-def _rows(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
+def rows_of(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
+    """What a run is, how far it has come and what its particles do, as people read it."""
     rows = scene_rows(overview)
     done = f"{max(0, overview.step)} of {overview.schedule.steps} steps"
     rows["progress"] = f"complete, {done}" if overview.complete else (

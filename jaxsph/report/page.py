@@ -81,6 +81,18 @@ def figure(png: bytes, caption: str) -> str:
     )
 
 
+def page_text(title: str, pieces: Iterable[str], again: float | None = None) -> str:
+    """A page; one that is to be loaded again after some seconds if `again` is given."""
+    name = escape(title)
+    refresh = "" if again is None else f'<meta http-equiv="refresh" content="{again:g}">\n'
+    head = (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{refresh}'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{name}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n"
+    )
+    return head + "\n".join(pieces) + "\n</body>\n</html>\n"
+
+
 def write_page(path: str | os.PathLike, title: str, pieces: Iterable[str]) -> Path:
     """Write a page, whole or not at all, and return its path.
 
@@ -89,13 +101,7 @@ def write_page(path: str | os.PathLike, title: str, pieces: Iterable[str]) -> Pa
         title: of the page.
         pieces: made by the other functions here.
     """
-    path, name = Path(path), escape(title)
-    text = (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{name}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n"
-    )
-    text += "\n".join(pieces) + "\n</body>\n</html>\n"
+    path, text = Path(path), page_text(title, pieces)
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:

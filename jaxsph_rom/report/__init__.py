@@ -4,6 +4,7 @@ from .case import Case as Case
 from .figures import Profile as Profile
 from .figures import centre_line_profiles as centre_line_profiles
 from .figures import discrepancy_history as discrepancy_history
+from .figures import field_differences as field_differences
 from .figures import field_snapshots as field_snapshots
 from .figures import modes as modes
 from .figures import singular_values as singular_values

@@ -19,6 +19,7 @@ from ..report import (
     best,
     centre_line_profiles,
     discrepancy_history,
+    field_differences,
     field_snapshots,
     modes,
     singular_values,
@@ -35,7 +36,8 @@ _LABELS = {"galerkin": "Galerkin", "apg": "Petrov-Galerkin"}
 _SHOWN_MODES = (1, 5, 10)
 _SETTINGS = ("advection", "map", "interpolation", "spline_order", "judged_from")
 _WRITTEN = (
-    "singular_values*.png", "modes*.png", "fields_re_*.png", "discrepancy.png", "centre_line.png",
+    "singular_values*.png", "modes*.png", "fields_re_*.png", "differences_re_*.png",
+    "discrepancy.png", "centre_line.png",
     MODEL,
 )  # fmt: skip
 _LISTED_MODES = (2, 5, 10, 20, 30)
@@ -229,6 +231,10 @@ def _fields(runs: FullRuns, outcomes: Sequence[Outcome], folder: Path, time: flo
         file = field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")
         caption = f"Velocity norm and pressure at Re {reynolds:g}, t = {full.time[k]:.4g} s."
         shown.append((file, caption))
+        if len(rows) > 1:
+            file = field_differences(rows, folder / f"differences_re_{reynolds:g}.png")
+            caption = f"Reduced minus full at Re {reynolds:g}, t = {full.time[k]:.4g} s."
+            shown.append((file, caption))
     return shown
 
 

@@ -38,7 +38,8 @@ def test_a_study_from_one_line(tmp_path, capsys):
     assert energies["reference"]["2"] <= 100.0 and energies["lagrangian"]["2"] <= 100.0
     figures = {path.stem for path in tmp_path.glob("*.png")}
     assert figures == {
-        "singular_values", "modes", "discrepancy", "centre_line", "fields_re_150"
+        "singular_values", "modes", "discrepancy", "centre_line", "fields_re_150",
+        "differences_re_150",
     }  # fmt: skip
     table = capsys.readouterr().out
     assert "150" in table and "galerkin" in table

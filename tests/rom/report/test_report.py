@@ -16,12 +16,14 @@ from jaxsph_rom.report import (
     Profile,
     centre_line_profiles,
     discrepancy_history,
+    field_differences,
     field_snapshots,
     format_table,
     modes,
     singular_values,
     write_report,
 )
+from jaxsph_rom.report.figures.differences import linear_fit
 from jaxsph_rom.report.figures.spectrum import missing_energy
 
 DENSITY, SOUND = 1000.0, 10.0  # kg/m^3, m/s
@@ -312,6 +314,23 @@ def test_figures_leave_pyplot_alone(vortex, tmp_path):
     before = pyplot.get_fignums()
     draw_fields(vortex, tmp_path / "fields.png")
     assert pyplot.get_fignums() == before
+
+
+def test_differences_are_taken_where_the_reduced_run_is(tmp_path):
+    rng = np.random.default_rng(0)
+    position, points = rng.random((400, 2)), 0.2 + 0.6 * rng.random((50, 2))
+    slope = rng.normal(size=(2, 2))
+    found = linear_fit(points, position, position @ slope + 3.0)
+    np.testing.assert_allclose(found, points @ slope + 3.0, atol=1e-6)
+    waves = np.sin(6.0 * position[:, :1])
+    assert np.abs(linear_fit(points, position, waves) - np.sin(6.0 * points[:, :1])).max() < 0.1
+    full = ("full", position, np.ones(400), np.zeros(400))
+    reduced = ("reduced", points, np.full(50, 1.5), np.full(50, -2.0))
+    lost = ("lost", np.full((50, 2), np.nan), np.ones(50), np.ones(50))
+    path = field_differences([full, reduced, lost], tmp_path / "d.png")
+    assert path.read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(ValueError, match="rows: got 1"):
+        field_differences([full], path)
 
 
 def test_runs_that_are_all_nan_are_drawn(tmp_path):
