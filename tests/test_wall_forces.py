@@ -18,6 +18,7 @@ from jaxsph.io import read_overview, read_trajectory, snapshot_blocks
 from jaxsph.scenes import Scale, couette, enclosed_flow, taylor_green
 from jaxsph.schemes import Consistent, DeltaPlus
 from jaxsph.wall_forces import loads
+from jaxsph.wall_surface import moment
 
 START = jnp.zeros(())
 GRAVITY = 1.0  # m/s^2
@@ -78,7 +79,8 @@ def stirred(scene):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("scheme", [Consistent(), DeltaPlus()], ids=["consistent", "delta-plus"])
 def test_walls_get_what_the_fluid_loses(scheme, dim):
-    """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid."""
+    """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid;
+    and their moments, where all pairs of the fluid pull along the line between them."""
     scene = conserving(vessel(scheme, dim, 16 if dim == 2 else 12))
     state, model, measure = stirred(scene), scene.model(), WallForces.of(scene)
     forces, torques = measure(model, START, state)
@@ -90,6 +92,13 @@ def test_walls_get_what_the_fluid_loses(scheme, dim):
     # the terms' own size, and some thousand of them are added
     np.testing.assert_allclose(forces["walls"] - weight + momentum, 0.0, atol=1e-10 * largest)
     assert np.abs(forces["ball"]).max() > 0.01 * largest, "a force that is there"
+    if isinstance(scheme, DeltaPlus):
+        down = np.zeros_like(state.position)
+        down[:, -1] = -GRAVITY
+        gained = np.stack(moment(state.position.T, (scene.mass * (down - rates.velocity)).T))
+        lever = np.squeeze(gained.sum(axis=1))
+        largest = np.abs(torques["walls"]).max()
+        np.testing.assert_allclose(torques["walls"], lever, atol=1e-10 * largest)
     assert set(forces) == set(torques) == {"walls", "ball", "bottom"}
     assert torques["ball"].shape == (() if dim == 2 else (3,))
 
