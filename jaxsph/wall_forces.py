@@ -128,6 +128,11 @@ class WallForces(eqx.Module):
         return tuple(dict(zip(self.names, value, strict=True)) for value in found)
 
 
+def named(forces: WallForces | None) -> WallForces | None:
+    """The same if parts of the walls have names: then a run knows their means over time, too."""
+    return forces if forces is not None and len(forces.names) > 1 else None
+
+
 def loads(
     forces: WallForces, model: FullModel, time: Float[Array, ""], state: ParticleState
 ) -> Loads:
@@ -136,15 +141,11 @@ def loads(
     return _guarded(forces, model, time, state)[0]
 
 
-def loads_by(
-    forces: WallForces,
-    functional: SPHFunctional,
-    time: Float[Array, ""],
-    state: ParticleState,
-    neighbors: WallList,
+def loads_of(
+    forces: WallForces, functional: SPHFunctional, passed: tuple, neighbors: WallList
 ) -> Loads:
-    """The same by a neighbour list that is there; NaN where it overflowed."""
-    context, fields, ghosts, terms, sums = functional.passes(time, state, neighbors)
+    """The same of what `functional.passes` found by a neighbour list; NaN where it overflowed."""
+    context, fields, ghosts, terms, sums = passed
 
     def rates(sums):
         parts = (effect.rates(context, fields, sums) for effect in functional.effects)
@@ -152,7 +153,7 @@ def loads_by(
 
     pairs, position = neighbors.wall, fields["position"]
     held = forces.held[:, pairs.ghosts].astype(position.dtype)
-    walls = functional.walls.at(time)
+    walls = functional.walls.at(context.time)
     depth = walls.signed_distance(ghosts["position"])
     ghosts = ghosts | {"depth": depth, "held": held.T}
     on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
@@ -172,7 +173,8 @@ def loads_by(
 def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
     """The loads, and whether the neighbour list overflowed."""
     neighbors = model.at(time).prepare(state)
-    return loads_by(forces, model.functional, time, state, neighbors), neighbors.overflow
+    passed = model.functional.passes(time, state, neighbors)
+    return loads_of(forces, model.functional, passed, neighbors), neighbors.overflow
 
 
 _measured = eqx.filter_jit(_guarded, compiler_options=COMPILER_OPTIONS)

@@ -34,7 +34,7 @@ def reaction_of_ghosts(
     momentum. A force along or across the line between the two passes from one to the other on that
     line (Irving and Kirkwood 1950), so through the wall where the line crosses it,
 
-        x_ig = x_g + d_g / ((x_i - x_g) . n_g) (x_i - x_g),
+        x_ig = x_g + (x_i - x_g) d_g / ((x_i - x_g) . n_g),
 
     d_g the ghost's depth, and its torque is x_ig x f_ig: that of action and reaction where it acts
     along the line, that of the traction on the surface where it does not.
