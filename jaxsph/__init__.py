@@ -21,6 +21,7 @@ from .domain import Box as Box
 from .fluid import Fluid as Fluid
 from .fluid import LinearEquationOfState as LinearEquationOfState
 from .fluid import TaitEquationOfState as TaitEquationOfState
+from .forces_over_time import ForcesOverTime as ForcesOverTime
 from .full_model import FullModel as FullModel
 from .functional import SPHFunctional as SPHFunctional
 from .integrate import SimulationError as SimulationError

@@ -76,7 +76,16 @@ class SPHFunctional(eqx.Module):
             state: the particles.
             neighbors: a `WallList` where there are walls, else a `VerletList`.
         """
-        context, fields, sums = self.sums(time, state, neighbors)
+        return self.rates(*self.sums(time, state, neighbors), neighbors)
+
+    def rates(
+        self,
+        context: Context,
+        fields: dict[str, Array],
+        sums: dict[str, Array],
+        neighbors: VerletList | WallList,
+    ) -> ParticleState:
+        """The same from the sums of the second pass."""
         rates = {
             "position": fields["velocity"],
             "velocity": jnp.zeros_like(fields["velocity"]),

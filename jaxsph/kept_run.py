@@ -70,6 +70,7 @@ def kept_run(
             made_by=wanted,
             overwrite=done is not None,
             forces=options.get("measure"),
+            averaged=options.get("averaged"),
         )
     with writer, progress(done or 0) as report:
         part = simulate(

@@ -10,7 +10,7 @@ from .kept_run import kept_run
 from .progress import shown_steps
 from .simulate import simulate
 from .trajectory import Trajectory
-from .wall_forces import WallForces
+from .wall_forces import WallForces, named
 
 
 def run_scene(
@@ -29,7 +29,8 @@ def run_scene(
         progress: True for a bar on stderr, as of the command line; or what is called with the
             number of steps done since its last call.
         options: of `simulate`: `stepping`; `measure`, the forces on the scene's walls unless
-            another is given, None for nothing; and, without a path, `recorder`.
+            another is given, None for nothing; `averaged`, the same where parts of the walls are
+            named, None for nothing; and, without a path, `recorder`.
 
     Raises:
         TrajectoryFileError: if the file holds another run, naming what differs; it stays as it is.
@@ -45,7 +46,9 @@ def run_scene(
         >>> bool(energy[-1] < energy[0])  # viscosity takes it
         True
     """
-    options.setdefault("measure", WallForces.of(scene))
+    forces = WallForces.of(scene)
+    options.setdefault("measure", forces)
+    options.setdefault("averaged", named(forces))
     shown = partial(shown_steps, progress, scene.steps)
     if path is not None:
         return kept_run(

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .compiler_options import COMPILER_OPTIONS
+from .forces_over_time import ForcesOverTime
 from .integrate import (
     Fault,
     FaultCode,
@@ -27,8 +28,9 @@ from .integrate import (
 from .schedule import Schedule
 from .timing import Timing
 from .trajectory import Snapshot, Trajectory
+from .wall_forces import WallForces
 
-_LOADS = ("forces", "torques")
+_LOADS, _MEANS = ("forces", "torques"), ("mean_forces", "mean_torques")
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
 
 
@@ -43,9 +45,14 @@ Measure = Callable[[Any, jax.Array, Any], tuple[dict[str, jax.Array], dict[str, 
 
 
 @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
-def _interval(model, state, first_step, time_step, steps, stepping):
+def _interval(model, state, first_step, time_step, steps, stepping, averaged):
+    if averaged is not None:
+        model = ForcesOverTime(model, averaged)
+        state = model.start(state)
     state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1, stepping)
-    return state, fault, jax.tree.map(lambda a: a[0], snapshots)
+    means = None if averaged is None else state.means(averaged.names, steps * time_step)
+    state = state if averaged is None else state.particles
+    return state, fault, jax.tree.map(lambda a: a[0], snapshots), means
 
 
 def simulate(
@@ -59,6 +66,7 @@ def simulate(
     metadata: dict | None = None,
     stepping: Stepping = FixedSteps(),  # noqa: B008
     measure: Measure | None = None,
+    averaged: WallForces | None = None,
     watch: Watch | None = None,
 ) -> Trajectory:
     """Integrate a model and return its snapshots, the first being the state given.
@@ -80,6 +88,8 @@ def simulate(
             RK4, or another `Stepper` given to either.
         measure: model, time [s] and state of each snapshot -> forces and torques to go with it, by
             name: `jaxsph.WallForces.of(scene)`, say.
+        averaged: forces on walls whose means over each interval go with the snapshot at its end:
+            `ForcesOverTime`, of a full model. Those of the first are of that instant.
         watch: time [s] and each new snapshot -> why it is not to be believed, if it is not. The
             run goes on; the first such answer is a warning, and `doubt` in the metadata, with
             `doubt_time` [s].
@@ -107,10 +117,13 @@ def simulate(
     dt = jnp.asarray(time_step, dtype)
     records, times, metadata = [], [], dict(metadata or {})
 
-    def record(step, snapshot):
+    def record(step, snapshot, means=None):
         if measure is not None:
             loads = measure(model, jnp.asarray(step * time_step, dtype), state)
             snapshot = dataclasses.replace(snapshot, **dict(zip(_LOADS, loads, strict=True)))
+        if averaged is not None:
+            means = means or averaged(model, jnp.asarray(step * time_step, dtype), state)
+            snapshot = dataclasses.replace(snapshot, **dict(zip(_MEANS, means, strict=True)))
         snapshot = jax.tree.map(np.asarray, snapshot)
         particle = _lost(snapshot)
         if particle is not None:
@@ -145,6 +158,8 @@ def simulate(
             coordinates=stacked.coordinates,
             forces=stacked.forces,
             torques=stacked.torques,
+            mean_forces=stacked.mean_forces,
+            mean_torques=stacked.mean_torques,
             metadata={**metadata, **took.metadata()},
         )
 
@@ -154,8 +169,8 @@ def simulate(
         record(0, model.observe(state))
     while step < schedule.steps:
         start = clock.perf_counter()
-        new, fault, snapshot = jax.block_until_ready(
-            _interval(model, state, np.int32(step), dt, each, stepping)
+        new, fault, snapshot, means = jax.block_until_ready(
+            _interval(model, state, np.int32(step), dt, each, stepping, averaged)
         )
         elapsed = clock.perf_counter() - start
         if not compiled:  # this interval runs once more, for its time without compilation
@@ -176,7 +191,7 @@ def simulate(
             raise _failed(fault, model.likely_cause(fault, new, time_step))
         run_seconds += elapsed
         state, step = new, step + each
-        record(step, snapshot)
+        record(step, snapshot, means)
         if progress is not None:
             progress(each)
     return trajectory()

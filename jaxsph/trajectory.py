@@ -22,7 +22,8 @@ class Snapshot(eqx.Module):
     """Particle fields at one time: position [m], velocity [m/s], density [kg/m^3], pressure [Pa].
 
     `coordinates` are the reduced coordinates where a reduced model made the snapshot; `forces` (n,)
-    [N] and `torques` [N m] those of the fluid on its walls and their named parts, where measured.
+    [N] and `torques` [N m] those of the fluid on its walls and their named parts, where measured,
+    `mean_forces` and `mean_torques` their means over the time since the snapshot before.
     """
 
     position: Float[Array, "*times particles dim"]
@@ -32,6 +33,8 @@ class Snapshot(eqx.Module):
     coordinates: Float[Array, "*times modes"] | None = None
     forces: dict[str, Array] = eqx.field(default_factory=dict)
     torques: dict[str, Array] = eqx.field(default_factory=dict)
+    mean_forces: dict[str, Array] = eqx.field(default_factory=dict)
+    mean_torques: dict[str, Array] = eqx.field(default_factory=dict)
 
 
 class Trajectory(eqx.Module):
@@ -45,6 +48,8 @@ class Trajectory(eqx.Module):
         forces: (S, n) [N] of the fluid on its walls (`"walls"`) and on each named part of them, by
             name, of a metre's depth in two dimensions; empty where none were measured.
         torques: the same [N m], about the origin, (S,) in two dimensions and (S, 3) in three.
+        mean_forces, mean_torques: their means over the time since the snapshot before, of every
+            stage of every step; the first ones those of its instant.
         metadata: scene, parameters, and what the run took; JSON-like.
     """
 
@@ -56,6 +61,8 @@ class Trajectory(eqx.Module):
     coordinates: Float[np.ndarray, "times modes"] | None = None
     forces: dict[str, Float[np.ndarray, "times dim"]] = eqx.field(default_factory=dict)
     torques: dict[str, Float[np.ndarray, "times ..."]] = eqx.field(default_factory=dict)
+    mean_forces: dict[str, Float[np.ndarray, "times dim"]] = eqx.field(default_factory=dict)
+    mean_torques: dict[str, Float[np.ndarray, "times ..."]] = eqx.field(default_factory=dict)
     metadata: dict[str, Any] = eqx.field(static=True, default_factory=dict)
 
     @property
@@ -84,7 +91,8 @@ class Trajectory(eqx.Module):
         """A snapshot by its number; -1 for the last."""
         coordinates = None if self.coordinates is None else self.coordinates[number]
         fields = (self.position, self.velocity, self.density, self.pressure)
-        loads = ({k: v[number] for k, v in each.items()} for each in (self.forces, self.torques))
+        of_all = (self.forces, self.torques, self.mean_forces, self.mean_torques)
+        loads = ({k: v[number] for k, v in each.items()} for each in of_all)
         return Snapshot(*(field[number] for field in fields), coordinates, *loads)
 
     # What follows imports inside, since plotting and io import this module.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import equinox as eqx
@@ -15,13 +16,17 @@ from .at_ghosts import Otherwise
 from .compiler_options import COMPILER_OPTIONS
 from .effects.local_no_slip import NearWeight
 from .full_model import FullModel
+from .functional import SPHFunctional
+from .neighbors import WallList
 from .pairs import PairTerm
 from .particles import ParticleState
 from .shown import concrete
+from .wall_reaction import reaction_of_ghosts
 from .wall_sums import wall_sums
-from .wall_surface import Loads, WallSurface, reaction
+from .wall_surface import Loads, WallSurface
 from .walls.parts import WHOLE
 from .walls.surface import surface
+from .walls.turning import Turning
 from .walls.walls import distances
 
 _ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
@@ -30,11 +35,12 @@ _ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
 class WallForces(eqx.Module):
     """Force and torque on the walls, from the very sums that act on the fluid:
 
-        F_B = -m sum_i (d(du_i/dt) / dS) . S_B,
+        F_B = -m sum_i sum_g (d sum_k (du_k/dt) / dS_i) . s_ig,
 
-    S_B what the ghosts of a part B add to the sums S of the second pass, in which the rates of
+    s_ig what a ghost g of a part B adds to the sums S_i of the second pass, in which the rates of
     velocity are affine; the fields made of the first pass stay as they are. So action equals
-    reaction to round-off for every effect that has ghosts. Forces on the walls beside these sums,
+    reaction to round-off for every effect that has ghosts. The force of a pair acts where the line
+    between its two crosses the wall. Forces on the walls beside these sums,
     of a pressure that is taken out of them or of a repulsion, are added by their own effects
     (docs, "forces on walls").
 
@@ -45,6 +51,7 @@ class WallForces(eqx.Module):
         density: rho0 [kg/m^3] (static).
         held: which ghosts belong to each part.
         points, areas, parts: as those of `WallSurface`.
+        turning: of walls that turn along themselves, if any do.
 
     Examples:
         >>> import jax.numpy as jnp
@@ -63,6 +70,7 @@ class WallForces(eqx.Module):
     points: Float[Array, "points dim"]
     areas: Float[Array, "points dim"]
     parts: Bool[Array, "parts points"]
+    turning: Turning | None = None
 
     @classmethod
     def of(cls, scene: Any) -> WallForces | None:
@@ -80,6 +88,9 @@ class WallForces(eqx.Module):
             part.reference_length or length
             for part, length in zip(walls.parts, lengths[1:], strict=True)
         ]
+        here, velocity = np.asarray(walls.normal), np.asarray(walls.velocity)
+        here = ghosts + distances(walls.start_region, ghosts)[:, None] * here
+        of_parts = np.stack([own[nearest] for own in held])
         speed, dtype = float(scene.fluid.reference_speed), walls.position.dtype
         return cls(
             (WHOLE, *(part.name for part in walls.parts)),
@@ -89,7 +100,8 @@ class WallForces(eqx.Module):
             jnp.asarray(np.stack(held)),
             jnp.asarray(points, dtype),
             jnp.asarray(areas, dtype),
-            jnp.asarray(np.stack([own[nearest] for own in held])),
+            jnp.asarray(of_parts),
+            Turning.of(here, velocity, np.stack(held), of_parts),
         )
 
     def __call__(
@@ -116,6 +128,11 @@ class WallForces(eqx.Module):
         return tuple(dict(zip(self.names, value, strict=True)) for value in found)
 
 
+def named(forces: WallForces | None) -> WallForces | None:
+    """The same if parts of the walls have names: then a run knows their means over time, too."""
+    return forces if forces is not None and len(forces.names) > 1 else None
+
+
 def loads(
     forces: WallForces, model: FullModel, time: Float[Array, ""], state: ParticleState
 ) -> Loads:
@@ -124,35 +141,40 @@ def loads(
     return _guarded(forces, model, time, state)[0]
 
 
-def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
-    """The loads, and whether the neighbour list overflowed."""
-    neighbors = model.at(time).prepare(state)
-    functional = model.functional
-    context, fields, ghosts, terms, sums = functional.passes(time, state, neighbors)
-    near = PairTerm("wall_nearness", (), None, Otherwise((), _nearness(context.space)))
+def loads_of(
+    forces: WallForces, functional: SPHFunctional, passed: tuple, neighbors: WallList
+) -> Loads:
+    """The same of what `functional.passes` found by a neighbour list; NaN where it overflowed."""
+    context, fields, ghosts, terms, sums = passed
 
     def rates(sums):
         parts = (effect.rates(context, fields, sums) for effect in functional.effects)
         return sum(part["velocity"] for part in parts if "velocity" in part)
 
-    def of_part(held):
-        pairs = neighbors.wall.only(held)
-        added = wall_sums((*terms, near), fields, ghosts, context.space, pairs)
-        share = added.pop("wall_nearness")
-        added = {k: added.get(k, jnp.zeros_like(s)) for k, s in sums.items()}
-        return context.mass * jax.jvp(rates, (sums,), (added,))[1], share
-
-    given, nearness = jax.vmap(of_part)(forces.held)
+    pairs, position = neighbors.wall, fields["position"]
+    held = forces.held[:, pairs.ghosts].astype(position.dtype)
+    walls = functional.walls.at(context.time)
+    depth = walls.signed_distance(ghosts["position"])
+    ghosts = ghosts | {"depth": depth, "held": held.T}
+    on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
+    near = PairTerm("wall_nearness", (), None, Otherwise(("held",), _nearness(context.space)))
+    nearness = wall_sums((near,), fields, ghosts, context.space, pairs)["wall_nearness"].T
     whole = nearness[:1]
     shares = nearness / jnp.where(whole > 0.0, whole, 1.0)
-    position = fields["position"]
-    seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares)
-    found = [reaction(position, given)]
+    turning = None if forces.turning is None else forces.turning.gradient(walls.velocity)
+    seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares, turning)
+    found = [jax.tree.map(lambda each: held @ each, on_ghosts)]
     found += [effect.on_walls(context, fields, seen) for effect in functional.effects]
     found = [each for each in found if each is not None]
     whole = jax.tree.map(lambda *a: sum(a[1:], a[0]), *found)
-    kept = jax.tree.map(lambda a: jnp.where(neighbors.overflow, jnp.nan, a), whole)
-    return kept, neighbors.overflow
+    return jax.tree.map(lambda a: jnp.where(neighbors.overflow, jnp.nan, a), whole)
+
+
+def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
+    """The loads, and whether the neighbour list overflowed."""
+    neighbors = model.at(time).prepare(state)
+    passed = model.functional.passes(time, state, neighbors)
+    return loads_of(forces, model.functional, passed, neighbors), neighbors.overflow
 
 
 _measured = eqx.filter_jit(_guarded, compiler_options=COMPILER_OPTIONS)
@@ -168,5 +190,13 @@ def _whole(forces: WallForces, model: FullModel, time, state) -> Loads:
     raise ValueError("state: particles clump, far more beside each other than at rest.")
 
 
-def _nearness(space) -> NearWeight:
-    return NearWeight(1.0 / space.kernel_at_spacing)
+@dataclass(frozen=True)
+class _Nearness(NearWeight):
+    """The same for the ghosts of each part by themselves."""
+
+    def __call__(self, pair, i, j):
+        return j.held * self.weight(pair)
+
+
+def _nearness(space) -> _Nearness:
+    return _Nearness(1.0 / space.kernel_at_spacing)

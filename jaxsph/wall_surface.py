@@ -30,6 +30,7 @@ class WallSurface(eqx.Module):
         parts: which points belong to each of K parts (K, C).
         position: of the particles (N, n) [m].
         shares: of each part in the walls near each particle (K, N).
+        turning: d_i u_j of the walls at the points (C, n, n) [1/s], where any turn.
     """
 
     points: Float[Array, "points dim"]
@@ -37,6 +38,7 @@ class WallSurface(eqx.Module):
     parts: Bool[Array, "parts points"]
     position: Float[Array, "particles dim"]
     shares: Float[Array, "parts particles"]
+    turning: Float[Array, "points dim dim"] | None = None
 
     def held_off(self, force: Float[Array, "particles dim"]) -> Loads:
         """The reaction to what the walls as a whole do to each particle [N]."""
@@ -48,17 +50,34 @@ class WallSurface(eqx.Module):
         force = pressure[:, None] * self.areas
         missed = total - jnp.sum(force, axis=0)
         force = force + (size / jnp.sum(size))[:, None] * missed[None, :]
-        on_parts = jnp.where(self.parts[:, :, None], -force[None], 0.0)
-        return reaction(self.points, on_parts)
+        return self._on_points(force)
+
+    def turned(self, viscosity: Float[Array, ""]) -> Loads | None:
+        """-mu (d_i u_j) A_j of walls that turn, mu [Pa s]: what a viscosity that knows the gradient
+        of each component by itself leaves out of the force on them."""
+        if self.turning is None:
+            return None
+        force = jnp.einsum("cij,cj->ci", self.turning, self.areas)
+        return self._on_points(-viscosity * force)
+
+    def _on_points(self, force: Float[Array, "points dim"]) -> Loads:
+        return reaction(self.points, jnp.where(self.parts[:, :, None], -force[None], 0.0))
 
 
 def reaction(
     position: Float[Array, "points dim"], force: Float[Array, "parts points dim"]
 ) -> Loads:
     """The opposite of forces at points, added up for each part."""
-    along = position[None]
-    if position.shape[1] == 2:
-        torque = along[..., 0] * force[..., 1] - along[..., 1] * force[..., 0]
-    else:
-        torque = jnp.cross(along, force)
-    return Loads(-jnp.sum(force, axis=1), -jnp.sum(torque, axis=1))
+    torque = moment(jnp.moveaxis(position, 1, 0)[:, None], jnp.moveaxis(force, 2, 0))
+    torque = jnp.stack([jnp.sum(each, axis=1) for each in torque], axis=-1)
+    return Loads(-jnp.sum(force, axis=1), -(torque[:, 0] if torque.shape[1] == 1 else torque))
+
+
+def moment(arm, force) -> tuple[Array, ...]:
+    """x cross f, component by component: one in two dimensions, three in three."""
+    if len(arm) == 2:
+        return (arm[0] * force[1] - arm[1] * force[0],)
+    return tuple(
+        arm[(k + 1) % 3] * force[(k + 2) % 3] - arm[(k + 2) % 3] * force[(k + 1) % 3]
+        for k in range(3)
+    )

@@ -1,6 +1,7 @@
 """Forces on walls: action equals reaction, water's weight, buoyancy, derivatives, files."""
 
 import dataclasses
+import json
 
 import equinox as eqx
 import h5py
@@ -14,10 +15,14 @@ from jaxsph import BallRegion, Box, BoxRegion, WallForces, WallPart
 from jaxsph.cli import main
 from jaxsph.effects import Gravity
 from jaxsph.integrate import integrate
-from jaxsph.io import read_overview, read_trajectory, snapshot_blocks
+from jaxsph.io import read_forces, read_overview, read_trajectory, snapshot_blocks
+from jaxsph.plotting import forces_figure
+from jaxsph.report.run_report import write_run_report
 from jaxsph.scenes import Scale, couette, enclosed_flow, taylor_green
 from jaxsph.schemes import Consistent, DeltaPlus
 from jaxsph.wall_forces import loads
+from jaxsph.wall_surface import moment
+from tests.pages import checked_page
 
 START = jnp.zeros(())
 GRAVITY = 1.0  # m/s^2
@@ -78,7 +83,8 @@ def stirred(scene):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("scheme", [Consistent(), DeltaPlus()], ids=["consistent", "delta-plus"])
 def test_walls_get_what_the_fluid_loses(scheme, dim):
-    """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid."""
+    """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid;
+    and their moments, where all pairs of the fluid pull along the line between them."""
     scene = conserving(vessel(scheme, dim, 16 if dim == 2 else 12))
     state, model, measure = stirred(scene), scene.model(), WallForces.of(scene)
     forces, torques = measure(model, START, state)
@@ -90,6 +96,13 @@ def test_walls_get_what_the_fluid_loses(scheme, dim):
     # the terms' own size, and some thousand of them are added
     np.testing.assert_allclose(forces["walls"] - weight + momentum, 0.0, atol=1e-10 * largest)
     assert np.abs(forces["ball"]).max() > 0.01 * largest, "a force that is there"
+    if isinstance(scheme, DeltaPlus):
+        down = np.zeros_like(state.position)
+        down[:, -1] = -GRAVITY
+        gained = np.stack(moment(state.position.T, (scene.mass * (down - rates.velocity)).T))
+        lever = np.squeeze(gained.sum(axis=1))
+        largest = np.abs(torques["walls"]).max()
+        np.testing.assert_allclose(torques["walls"], lever, atol=1e-10 * largest)
     assert set(forces) == set(torques) == {"walls", "ball", "bottom"}
     assert torques["ball"].shape == (() if dim == 2 else (3,))
 
@@ -221,8 +234,8 @@ def test_forces_are_kept_with_each_snapshot(run):
         assert file["torques/ball"].shape == (len(again.time),)
         np.testing.assert_array_equal(file["forces/time"], again.time)
         attributes = dict(file["forces/ball"].attrs)
-    late = again.time >= 0.8 * again.time[-1]
-    mean = again.forces["ball"][late].mean(axis=0)
+    late = again.time > 0.8 * again.time[-1] + 1e-9
+    mean = again.mean_forces["ball"][late].mean(axis=0)
     found = [attributes["drag_coefficient"], attributes["lift_coefficient"]]
     assert found == pytest.approx(2.0 * mean / (1000.0 * 0.5**2 * 0.4))  # per metre of depth
     assert (attributes["reference_length"], attributes["reference_speed"]) == (0.4, 0.5)
@@ -235,13 +248,37 @@ def test_forces_are_kept_with_each_snapshot(run):
     np.testing.assert_array_equal(again.snapshot(-1).torques["ball"], again.torques["ball"][-1])
 
 
-def test_forces_are_told(run, capsys):
+def test_forces_are_told(run, capsys, tmp_path):
     path, trajectory = run
     assert main(["show", str(path)]) == 0
     shown = capsys.readouterr().out
-    assert "force on ball" in shown and "drag coefficient" in shown and "0.5 m/s" in shown
-    last = read_overview(path).forces["ball"]["last_force"]
-    np.testing.assert_array_equal(last, trajectory.forces["ball"][-1])
+    assert "force on ball" in shown and "torque on ball" in shown
+    assert "drag coefficient" in shown and "of 0.5 m/s and 0.4 m" in shown
+    told = read_overview(path).forces["ball"]
+    np.testing.assert_array_equal(told["last_force"], trajectory.forces["ball"][-1])
+    np.testing.assert_array_equal(told["last_torque"], trajectory.torques["ball"][-1])
+    assert main(["show", str(path), "--json", str(tmp_path / "show.json")]) == 0
+    written = json.loads((tmp_path / "show.json").read_text())["forces"]["ball"]
+    assert written == told
+
+
+def test_report_has_drag_and_lift_over_time(run, tmp_path):
+    path, trajectory = run
+    figures = forces_figure({k: v for k, v in read_forces(path).items() if k != "walls"})
+    drag, lift = figures.axes
+    assert [axes.get_ylabel() for axes in (drag, lift)] == ["drag coefficient", "lift coefficient"]
+    scale = 2.0 / (1000.0 * 0.5**2 * 0.4)
+    ball = drag.lines[0].get_ydata()
+    np.testing.assert_allclose(ball[1:], scale * trajectory.mean_forces["ball"][1:, 0])
+    assert ball[0] == ball[1], "a mean is drawn over its interval"
+    written = write_run_report(tmp_path / "report.html", path, 1.0, {}, {})
+    assert "Force on each named body" in checked_page(written).text
+    unknown = read_forces(trajectory.save(tmp_path / "copy.h5"))  # has no reference
+    drag, lift = forces_figure(unknown).axes
+    assert lift.get_ylabel() == "lift force [N/m]"
+    np.testing.assert_array_equal(
+        lift.lines[0].get_ydata()[1:], trajectory.mean_forces[lift.lines[0].get_label()][1:, 1]
+    )
 
 
 def test_saved_trajectory_keeps_forces(run, tmp_path):

@@ -7,6 +7,7 @@ from .measures import (
     beyond_walls,
     density_deviation,
     energy_change,
+    energy_left,
     energy_over_reference,
     energy_over_start,
     highest_speed,
@@ -54,6 +55,10 @@ DRIVEN = Bound(
 LID_SPEED = Bound(
     "highest speed", highest_speed, 1.2,
     "no fluid outruns the lid by more than its noise",
+)  # fmt: skip
+INFLOW_SPEED = Bound(
+    "highest speed", highest_speed, 1.2,
+    "no fluid outruns the inflow's peak by more than its noise",
 )  # fmt: skip
 CHANNEL_SPEED = Bound(
     "highest speed", highest_speed, 1.0,
@@ -111,6 +116,15 @@ JOLT = Bound(
     "a layer thinner than a spacing starts as a jump of 2 U between rows, whose sound is loud",
 )  # fmt: skip
 
+AT_END = Bound(
+    "energy left", energy_left, 1e-3,
+    "nothing comes in any more, and friction has had 4 pi^2 nu / H^2 = 4 1/s for 2 s",
+)  # fmt: skip
+FLUSH = Bound(
+    "density", density_deviation, 0.1,
+    "a body that is set going at once starts with a jump of rho0 c0 U at its surface",
+)  # fmt: skip
+
 SPLASH = (LOOSE_DENSITY, FALL, JET, WALLS)
 PATCH = (DENSITY, DECAY)
 LAYER = (DENSITY, DECAY, MOMENTUM, DISTANCE, EVEN)
@@ -121,5 +135,8 @@ TENSION_DROP = (DENSITY, CAPILLARY, DISTANCE, EVEN)
 VORTEX = (DENSITY, DECAY, MOMENTUM, DISTANCE, EVEN, VOLUME)
 CAVITY = (DENSITY, DRIVEN, LID_SPEED, WALLS, DISTANCE, EVEN)
 CHANNEL = (DENSITY, CHANNEL_SPEED, WALLS, DISTANCE, EVEN)
+PULSED = (DENSITY, INFLOW_SPEED, WALLS, DISTANCE, EVEN)
+STOPPED = (*PULSED, AT_END)
+FLUSHED = (FLUSH, FAST, WALLS, DISTANCE, EVEN)
 TANK = (DENSITY, STILL, HYDROSTATIC, WALLS, DISTANCE, EVEN)
 SCATTERED = (LOOSE_DENSITY, FAST)

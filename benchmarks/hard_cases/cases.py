@@ -6,6 +6,7 @@ from .consistent_cases import CONSISTENT
 from .free_cases import FREE
 from .full_cases import FULL
 from .judge import Case
+from .open_cases import OPEN
 from .reduced_cases import REDUCED
 from .reference_cases import ON_REFERENCE_POINTS
 from .spoilt_cases import SPOILT
@@ -25,4 +26,4 @@ def _table(*groups: tuple[Case, ...]) -> dict[str, Case]:
     return table
 
 
-CASES = _table(FULL, CONSISTENT, FREE, SPOILT, REDUCED, ON_REFERENCE_POINTS)
+CASES = _table(FULL, CONSISTENT, FREE, OPEN, SPOILT, REDUCED, ON_REFERENCE_POINTS)

@@ -65,6 +65,12 @@ def energy_over_start(scene: Scene, trajectory: Trajectory) -> float:
     return float(energy.max() / energy[0])
 
 
+def energy_left(scene: Scene, trajectory: Trajectory) -> float:
+    """E(end) / E(0), E the kinetic energy."""
+    energy = kinetic_energy(np.float64(trajectory.velocity), float(scene.mass))
+    return float(energy[-1] / energy[0])
+
+
 def energy_change(scene: Scene, trajectory: Trajectory) -> float:
     """max_t |E(t) / E(0) - 1|, E the kinetic energy."""
     energy = kinetic_energy(np.float64(trajectory.velocity), float(scene.mass))

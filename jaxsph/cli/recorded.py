@@ -14,13 +14,14 @@ from jaxsph_command.errors import fail
 from ..environment import environment
 from ..history import energy_unit
 from ..integrate import Model, SimulationError
-from ..io import TrajectoryFileError, TrajectoryWriter
+from ..io import TrajectoryFileError, TrajectoryWriter, read_overview
 from ..metrics import kinetic_energy
 from ..progress import progress_bar
+from ..report.force_rows import force_rows
 from ..scenes import Scene
 from ..simulate import simulate
 from ..trajectory import Trajectory
-from ..wall_forces import WallForces
+from ..wall_forces import WallForces, named
 from .options import STEPPING, print_rows, write_json
 
 REPORT = "report.html"  # its name, beside the trajectory
@@ -41,6 +42,7 @@ def simulate_and_report(
     metadata = {"scene": scene.name, "parameters": scene.parameters}
     if first_step:
         metadata["resumed_from_step"] = first_step
+    forces = WallForces.of(scene)
     bar = progress_bar(scene.steps, "step", first_step)
     try:
         with writer, bar:
@@ -53,7 +55,8 @@ def simulate_and_report(
                 progress=bar.update,
                 metadata=metadata,
                 stepping=STEPPING[options.steps],
-                measure=WallForces.of(scene),
+                measure=forces,
+                averaged=named(forces),
             )
             writer.finish(trajectory.metadata)
     except SimulationError as error:
@@ -63,9 +66,10 @@ def simulate_and_report(
         return fail("jaxsph", f"{error} {_holds(writer)}", 1)
     except KeyboardInterrupt:
         return fail("jaxsph", f"interrupted. {_holds(writer)} Go on with --resume.", 130)
-    results = _results(scene, trajectory, writer.path)
+    overview = read_overview(writer.path)
+    results = {**_results(scene, trajectory, writer.path), "forces": overview.forces}
     write_json(options.json, {**results, **environment()})
-    rows = _rows(results)
+    rows = {**_rows(results), **force_rows(overview), "trajectory": results["trajectory"]}
     print_rows({**rows, "report": str(_report(options, scene, writer, rows))})
     return 0
 
@@ -147,5 +151,4 @@ def _rows(results: dict[str, Any]) -> dict[str, str]:
         velocity, energy = results["errors"].values()
         rows["velocity error"] = f"{100.0 * velocity:.3g} % (relative L2, at the end)"
         rows["kinetic energy error"] = f"{100.0 * energy:.3g} % (at the end)"
-    rows["trajectory"] = results["trajectory"]
     return rows

@@ -11,7 +11,7 @@ from jaxsph_command.errors import Parser
 
 from ..io import TrajectoryWriter, check_target
 from ..scenes import SCENES
-from ..wall_forces import WallForces
+from ..wall_forces import WallForces, named
 from .options import STEPPING, add_json_option, margin
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
@@ -60,6 +60,8 @@ def _run(options) -> int:
         scene = made(make, settings)
         model = scene.model(margin=options.capacity_margin)
         forces = WallForces.of(scene)
-        writer = TrajectoryWriter.create(path, scene, overwrite=options.overwrite, forces=forces)
+        writer = TrajectoryWriter.create(
+            path, scene, overwrite=options.overwrite, forces=forces, averaged=named(forces)
+        )
         write_config(path.with_name(NAME), options)
         return simulate_and_report(options, scene, model, writer, 0)

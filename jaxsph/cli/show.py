@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from ..history import energy_unit, read_history
 from ..io import Overview, check_target, read_overview, read_snapshot, read_walls
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
+from ..report.force_rows import force_rows
 from ..report.settings import scene_rows
 from .options import add_json_option, bytes_told, print_rows, write_json
 from .show_contents import contents, file_format
@@ -115,23 +115,9 @@ def rows_of(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
         low, high = measures["lowest_density"], measures["highest_density"]
         rows["density"] = f"{low:.5g} to {high:.5g} kg/m^3 ({some})"
         rows["largest speed"] = f"{measures['highest_speed']:.4g} m/s ({some})"
-    unit = "N" if overview.dim == 3 else "N/m"
-    for name, told in overview.forces.items():
-        if told["last_force"] is not None:
-            force = ", ".join(f"{value:.5g}" for value in told["last_force"])
-            rows[f"force on {name}"] = f"({force}) {unit} at last{_coefficients(told)}"
+    rows |= force_rows(overview)
     if "run_seconds" in overview.metadata:
         rows["run"] = f"{overview.metadata['run_seconds']:.3g} s"
     rows["versions"] = ", ".join(f"{name} {text}" for name, text in overview.versions.items())
     return rows
 
-
-def _coefficients(told: dict[str, Any]) -> str:
-    """Mean drag and lift, with what they refer to; nothing where these are not known."""
-    if not math.isfinite(told.get("drag_coefficient", math.nan)):
-        return ""
-    return (
-        f"; drag coefficient {told['drag_coefficient']:.5g}, lift coefficient "
-        f"{told['lift_coefficient']:.5g} (last fifth; {told['reference_speed']:g} m/s, "
-        f"{told['reference_length']:g} m)"
-    )

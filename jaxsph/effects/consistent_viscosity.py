@@ -87,6 +87,10 @@ class ConsistentViscosity(Effect):
         linear = along(gradient, sums["sharp_gradient"])
         return {"sharp_trace": sums["sharp_trace"], "linear_part": linear}
 
+    def on_walls(self, context, fields, surface):
+        """What walls that turn feel beside mu du/dn, their own velocity being no uniform one."""
+        return surface.turned(self.viscosity * context.fluid.reference_density)
+
     def rate_terms(self, context):
         laplacian = SharpLaplacian(_weight(context.space))
         return (PairTerm("sharp_laplacian", ("velocity",), laplacian, Same()),)

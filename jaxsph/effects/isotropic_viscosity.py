@@ -31,6 +31,10 @@ class IsotropicViscosity(Effect):
     def step_limit(self, fluid, space):
         return viscous_step_limit(self.viscosity, space)
 
+    def on_walls(self, context, fields, surface):
+        """What walls that turn feel beside mu du/dn, their own velocity being no uniform one."""
+        return surface.turned(self.viscosity * context.fluid.reference_density)
+
     def rate_terms(self, context):
         return (PairTerm("laplacian_sum", ("velocity",), laplacian_sum, Same()),)
 

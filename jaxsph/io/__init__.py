@@ -6,6 +6,8 @@ from .lock import Lock as Lock
 from .overview import Overview as Overview
 from .overview import read_overview as read_overview
 from .overview import read_snapshot as read_snapshot
+from .recorded_forces import ForceHistory as ForceHistory
+from .recorded_forces import read_forces as read_forces
 from .saved_trajectory import save_trajectory as save_trajectory
 from .snapshot_blocks import snapshot_blocks as snapshot_blocks
 from .trajectory_file import Checkpoint as Checkpoint

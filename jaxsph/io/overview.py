@@ -38,8 +38,9 @@ class Overview:
         particles, dim: how many, and in how many dimensions.
         dtype: of the fields.
         size: of the file [bytes].
-        forces: on each part of the walls, by name: the last one [N], and where the run has ended
-            drag and lift coefficients, means over its last fifth, with what they refer to.
+        forces: on each part of the walls, by name: force [N] and torque [N m] of the last snapshot
+            and in the mean over the last fifth of what is there, drag and lift coefficients of that
+            mean, and what they refer to.
     """
 
     scene: str

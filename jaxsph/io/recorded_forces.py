@@ -2,29 +2,74 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from jaxtyping import Float
 
 from ..wall_forces import WallForces
 from .growing_file import add_dataset
+from .trajectory_file import opened, patient
 
 _LAST = 0.2  # of a run: the mean of its coefficients is over that
 _MEANS = ("drag_coefficient", "lift_coefficient")
 _REFERENCES = ("reference_speed", "reference_length", "reference_density")
 
 
-def begin_forces(file: h5py.File, forces: WallForces, dim: int, dtype: np.dtype) -> None:
-    """Empty datasets `forces/NAME` (S, n) and `torques/NAME` for each part of the walls."""
+@dataclass(frozen=True)
+class ForceHistory:
+    """The force on a part of the walls at each of S snapshots.
+
+    Args:
+        time: (S,) [s].
+        force: (S, n) [N], of a metre's depth in two dimensions: means over the time since the
+            snapshot before where `averaged`, else those of the instants.
+        averaged: which of the two.
+        scale: 2 / (rho0 U^2 L^(n - 1)) [1/N], by which it becomes coefficients; NaN if there is no
+            reference.
+    """
+
+    time: Float[np.ndarray, " times"]
+    force: Float[np.ndarray, "times dim"]
+    averaged: bool
+    scale: float
+
+
+@patient
+def read_forces(path: str | os.PathLike) -> dict[str, ForceHistory]:
+    """The forces on the walls in a trajectory file, `walls` and each named part; it may still be
+    written.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file.
+    """
+    found = {}
+    with opened(Path(path)) as (file, count):
+        time = file["time"][:count]
+        for name in parts(file):
+            kind = kept_kind(file, "forces", name)
+            force, averaged = file[f"{kind}/{name}"][:count], kind != "forces"
+            found[name] = ForceHistory(time, force, averaged, coefficient_scale(file, name))
+    return found
+
+
+def begin_forces(
+    file: h5py.File, forces: WallForces, dim: int, dtype: np.dtype, prefix: str = ""
+) -> None:
+    """Empty datasets `forces/NAME` (S, n) and `torques/NAME` for each part of the walls, or those
+    of the means, `mean_forces/NAME` and `mean_torques/NAME`."""
     names = zip(forces.names, forces.reference_speeds, forces.reference_lengths, strict=True)
     for name, speed, length in names:
-        made = add_dataset(file, f"forces/{name}", (dim,), dtype)
+        made = add_dataset(file, f"{prefix}forces/{name}", (dim,), dtype)
         for key, value in zip(_REFERENCES, (speed, length, forces.density), strict=True):
             made.attrs[key] = value
-        for key in _MEANS:  # what a file may have must be there before it grows
+        for key in () if prefix else _MEANS:  # what a file may have must be there before it grows
             made.attrs[key] = np.nan
-        add_dataset(file, f"torques/{name}", () if dim == 2 else (dim,), dtype)
+        add_dataset(file, f"{prefix}torques/{name}", () if dim == 2 else (dim,), dtype)
     link_time(file)
 
 
@@ -42,28 +87,53 @@ def parts(file: h5py.File) -> list[str]:
 
 
 def sum_up(file: h5py.File, count: int) -> None:
-    """Drag and lift coefficients as attributes: 2 F / (rho0 U^2 L^(n - 1)) of the mean force along
-    the first and the second axis over the run's last fifth."""
-    time = file["time"][:count]
+    """Drag and lift coefficients as attributes of `forces/NAME`: 2 F / (rho0 U^2 L^(n - 1)) of the
+    mean force along the first and the second axis over the run's last fifth."""
     for name in parts(file):
-        dataset = file[f"forces/{name}"]
-        speed, length, density = (dataset.attrs[key] for key in _REFERENCES)
-        late = time >= time[-1] - _LAST * (time[-1] - time[0])
-        mean = dataset[:count][late].mean(axis=0, dtype=np.float64)
-        scale = 2.0 / (density * speed**2 * length ** (len(mean) - 1))
-        for key, value in zip(_MEANS, scale * mean[:2], strict=True):
-            dataset.attrs.modify(key, value)
+        attributes = file[f"forces/{name}"].attrs
+        mean = _late(file, "forces", name, count)
+        for key, value in zip(_MEANS, (coefficient_scale(file, name) * mean)[:2], strict=True):
+            attributes.modify(key, value)
+
+
+def coefficient_scale(file: h5py.File, name: str) -> float:
+    """2 / (rho0 U^2 L^(n - 1)) [1/N] of a part; NaN where it has no reference."""
+    dataset = file[f"forces/{name}"]
+    speed, length, density = (float(dataset.attrs[key]) for key in _REFERENCES)
+    return 2.0 / (density * speed**2 * length ** (dataset.shape[1] - 1))
+
+
+def kept_kind(file: h5py.File, kind: str, name: str) -> str:
+    """`mean_forces` or `mean_torques` of a part where a file has them, else those of instants."""
+    return f"mean_{kind}" if f"mean_{kind}/{name}" in file else kind
+
+
+def _late(file: h5py.File, kind: str, name: str, count: int) -> np.ndarray:
+    """The mean over the last fifth of a run, of the means between snapshots if there are any."""
+    time, kind = file["time"][:count], kept_kind(file, kind, name)
+    since = time[-1] - _LAST * (time[-1] - time[0])
+    # a mean is one over the time before its snapshot
+    late = time > since + 1e-9 * time[-1] if kind.startswith("mean_") else time >= since
+    late[-1] = True
+    return file[f"{kind}/{name}"][:count][late].mean(axis=0, dtype=np.float64)
 
 
 def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
-    """The last force on each part, and the coefficients with what they refer to."""
+    """Force and torque on each part, at last and in the mean over the last fifth of what is there,
+    and the coefficients of these means with what they refer to."""
     found = {}
     for name in parts(file):
-        dataset = file[f"forces/{name}"]
-        means = {key: float(dataset.attrs[key]) for key in _MEANS}
-        found[name] = {
-            "last_force": dataset[count - 1].tolist() if count else None,
-            **(means if file.attrs["complete"] else {}),
-            **{key: float(dataset.attrs[key]) for key in _REFERENCES},
-        }
+        attributes = file[f"forces/{name}"].attrs
+        told = {"last_force": None, "last_torque": None}
+        if count:
+            mean = _late(file, "forces", name, count)
+            scale = coefficient_scale(file, name)
+            told = {
+                "last_force": file[f"forces/{name}"][count - 1].tolist(),
+                "last_torque": file[f"torques/{name}"][count - 1].tolist(),
+                "mean_force": mean.tolist(),
+                "mean_torque": _late(file, "torques", name, count).tolist(),
+                **dict(zip(_MEANS, (scale * mean[:2]).tolist(), strict=True)),
+            }
+        found[name] = told | {key: float(attributes[key]) for key in _REFERENCES}
     return found

@@ -58,6 +58,7 @@ def save_trajectory(
         made_by={},
         overwrite=overwrite,
         forces=forces if names else None,
+        averaged=forces if trajectory.mean_forces else None,
     ) as writer:
         for number, step in enumerate(steps):
             writer.append(int(step), float(time[number]), trajectory.snapshot(number))

@@ -32,7 +32,8 @@ UNITS = {
     "time": "s",
     "step": "1",
 }
-LOADS = {"forces": "N", "torques": "N m"}  # groups of a dataset for each part of the walls
+# groups of a dataset for each part of the walls
+LOADS = {"forces": "N", "torques": "N m", "mean_forces": "N", "mean_torques": "N m"}
 FIELDS = ("position", "velocity", "density", "pressure")
 _ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -79,6 +79,7 @@ class TrajectoryWriter:
         made_by: Mapping[str, str] | None = None,
         overwrite: bool = False,
         forces: WallForces | None = None,
+        averaged: WallForces | None = None,
     ) -> TrajectoryWriter:
         """A new file for a run of a scene; folders are made as needed.
 
@@ -91,6 +92,7 @@ class TrajectoryWriter:
             made_by: the `content` of what makes the run; that of the scene if none is given.
             overwrite: whether an existing file may be replaced.
             forces: on the walls, if snapshots carry those that this measures.
+            averaged: the same, if snapshots carry their means.
 
         Raises:
             TrajectoryFileError: if the file exists, cannot be made, or is being written.
@@ -131,8 +133,10 @@ class TrajectoryWriter:
             walls = getattr(scene, "walls", None)
             if walls is not None:
                 file.create_group("walls")["position"] = np.float32(walls.fixed_position)
-            if forces is not None:
-                begin_forces(file, forces, shapes["position"][1], np.dtype(state.position.dtype))
+            loads = ("", forces), ("mean_", averaged)
+            for prefix, each in (pair for pair in loads if pair[1] is not None):
+                dim, dtype = shapes["position"][1], np.dtype(state.position.dtype)
+                begin_forces(file, each, dim, dtype, prefix)
 
         return cls(path, fill)
 

@@ -8,12 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-from ..io import read_overview, read_snapshot, read_walls
-from ..plotting import history_figure, snapshot_figure
+from ..io import read_forces, read_overview, read_snapshot, read_walls
+from ..plotting import forces_figure, history_figure, snapshot_figure
 from ..plotting.style import png
+from ..walls.parts import WHOLE
 from . import page
 from .film import film
 from .settings import origin_rows, scene_rows
+
+_FORCES = (
+    "Force on each named body along the first axis and across it, over time; what the first tenth "
+    "of the run has beyond the rest's range is cut off."
+)
 
 
 def write_run_report(
@@ -57,6 +63,9 @@ def write_run_report(
                 "over time.",
             ),
         ]
+        bodies = {k: v for k, v in read_forces(trajectory).items() if k != WHOLE}
+        if bodies:
+            pieces += [page.figure(png(forces_figure(bodies)), _FORCES)]
     pieces += [page.heading("Scene and settings"), page.rows(scene_rows(overview))]
     pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     return page.write_page(path, f"jaxsph: {overview.scene}", pieces)

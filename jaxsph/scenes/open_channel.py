@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -31,6 +32,7 @@ def open_channel(
     fringe: float,
     height: float,
     mean_speed: float,
+    inflow: eqx.Module | None = None,
     start: Callable | None = None,
     obstacle: Region | None = None,
     parts: Sequence[WallPart] = (),
@@ -53,7 +55,10 @@ def open_channel(
         length: of the channel [m].
         fringe: least length of the fringe [m]; it ends where a row of particles does.
         height: of the channel [m].
-        mean_speed: of the inflow's parabola [m/s]; its peak is half as much again.
+        mean_speed: of the inflow's parabola [m/s]; its peak, half as much again, is the speed that
+            the Mach number is of: no inflow should be much faster.
+        inflow: its profile, positions (N, 2) [m] and a time [s] -> velocities (N, 2) [m/s], if it
+            is another than that parabola: `Varying(ParabolicProfile(...), factor)`, say.
         start: positions (N, 2) [m] -> velocities at the start (N, 2) [m/s]; the inflow's profile
             everywhere if none is given.
         obstacle: in the channel, if there is one.
@@ -69,7 +74,8 @@ def open_channel(
     whole = spacing * math.ceil((length + fringe) / spacing - 1e-9)
     region: Region = BoxRegion((-np.inf, 0.0), (np.inf, height))
     region = region if obstacle is None else region & ~obstacle
-    profile = ParabolicProfile(jnp.asarray(1.5 * mean_speed), height)
+    parabola = ParabolicProfile(jnp.asarray(1.5 * mean_speed), height)
+    profile = parabola if inflow is None else inflow
     rate = jnp.asarray(_RATE * 1.5 * mean_speed / (mach * scale.h_over_dx * spacing))
     scene = enclosed_flow(
         name,
@@ -91,10 +97,11 @@ def open_channel(
         parameters=parameters,
     )
     state = scene.state
-    velocity = (profile if start is None else start)(state.position)
+    began = jnp.zeros((), state.position.dtype)
+    flowing = profile(state.position, began) if start is None else start(state.position)
     return dataclasses.replace(
         scene,
         effects=(*scene.effects, Fringe(profile, rate, length, whole)),
-        state=dataclasses.replace(state, velocity=velocity),
+        state=dataclasses.replace(state, velocity=flowing),
         solution=solution,
     )

@@ -22,6 +22,7 @@ from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
 _PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
+_HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
 _TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
 
 
@@ -32,7 +33,7 @@ class MovingWall:
 
     Args:
         part: region that holds the ghosts of this part.
-        velocity: ghost positions (G, n) [m] -> wall velocities (G, n) [m/s].
+        velocity: places on the wall (G, n) [m] -> its velocities there (G, n) [m/s].
     """
 
     part: Region
@@ -116,6 +117,7 @@ class Walls(eqx.Module):
         normal = _normals(fluid_region, ghosts)
         depth = distance(ghosts)[:, None]
         _refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
+        skin = ghosts + (1.0 - _HAIR) * depth * normal
         velocity = np.zeros_like(ghosts)
         for lid in moving:
             held = _in_blocks(_distance, lid.part, ghosts) < 0.0
@@ -124,7 +126,7 @@ class Walls(eqx.Module):
                     f"moving wall: no ghost lies in {lid.part}; a lid needs a wall to sit in. Let "
                     "its part cover ghosts beyond the fluid."
                 )
-            velocity[held] = np.asarray(lid.velocity(jnp.asarray(ghosts[held])))
+            velocity[held] = np.asarray(lid.velocity(jnp.asarray(skin[held])))
             across = np.abs((velocity * normal).sum(axis=1))[held]
             speed = np.linalg.norm(velocity[held], axis=1)
             if np.median(across) > 0.1 * np.median(speed):  # at corners normals are oblique

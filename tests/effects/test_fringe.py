@@ -35,7 +35,7 @@ def test_fringe_governs_its_second_half_and_leaves_the_channel_alone(scene):
     channel, held = x < fringe.start, x > 0.5 * (fringe.start + fringe.end)
     assert channel.any() and held.any()
     np.testing.assert_array_equal(found[channel], alone[channel])
-    excess = scene.state.velocity - fringe.profile(scene.state.position)
+    excess = scene.state.velocity - fringe.profile(scene.state.position, TIME)
     np.testing.assert_allclose(found[held], (-fringe.rate * excess)[held], rtol=1e-12, atol=1e-10)
 
 

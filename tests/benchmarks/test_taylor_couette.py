@@ -1,0 +1,40 @@
+"""Torque between cylinders: what the benchmark starts from and judges by, and its stored rows."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks import taylor_couette as benchmark
+
+ROWS = Path(benchmark.__file__).parent / "results" / "taylor_couette.json"
+
+
+@pytest.mark.parametrize("turns", ["inner", "outer"])
+def test_it_starts_from_the_exact_flow(turns):
+    case = {"scheme": "sharp-at-walls", "turns": turns, "resolution": 8, "h_over_dx": 2.0}
+    scene, a, b = benchmark.annulus(case)
+    for name, radius in (("inner", benchmark.INNER), ("outer", benchmark.OUTER)):
+        speed = a * radius + b / radius
+        assert speed == pytest.approx(benchmark.TURN * radius if name == turns else 0.0, abs=1e-12)
+    position, velocity = (np.asarray(each)[None] for each in (
+        scene.state.position, scene.state.velocity))  # fmt: skip
+    known = SimpleNamespace(position=position, velocity=velocity)
+    assert benchmark.profile_error(known, np.array([True]), a, b) < 1e-10
+    faster = SimpleNamespace(position=position, velocity=1.01 * velocity)
+    assert benchmark.profile_error(faster, np.array([True]), a, b) == pytest.approx(1.0)
+
+
+def test_stored_torques_converge():
+    rows = {(r["turns"], r["resolution"]): r for r in json.loads(ROWS.read_text())["rows"]}
+    for turns in ("inner", "outer"):
+        for wall in ("inner", "outer"):
+            name = f"{wall}_torque_error_percent"
+            assert abs(rows[turns, 16][name]) < abs(rows[turns, 8][name])
+
+
+def test_bad_input_is_refused():
+    assert benchmark.main(["--turns", "both"]) == 2
+    assert benchmark.main(["--resolutions", "0"]) == 2
