@@ -102,8 +102,8 @@ class Trajectory(eqx.Module):
 
         Args:
             time: [s]; the end if none is given.
-            options: of `jaxsph.plotting.snapshot_figure`: `fields`, and `walls`, which those of a
-                scene have as `scene.walls.fixed_position`.
+            options: of `jaxsph.plotting.snapshot_figure`: `fields`; `walls`, which a scene has as
+                `scene.walls.fixed_position`; `box`, its `scene.space.box`.
         """
         from .plotting import snapshot_figure
 
@@ -115,7 +115,8 @@ class Trajectory(eqx.Module):
 
         Args:
             path: of the picture, ending with `.gif` or `.mp4`; one that is there is replaced.
-            options: of `jaxsph.plotting.animate`, as `field`, `every`, and `walls` as for `plot`.
+            options: of `jaxsph.plotting.animate`, as `field` and `every`; `walls` and
+                `box` as for `plot`.
 
         Raises:
             ValueError: as `jaxsph.plotting.animate`.

@@ -8,7 +8,7 @@ from typing import Any
 from jaxsph_command.errors import Parser
 
 from ..history import energy_unit, read_history
-from ..io import Overview, check_target, read_overview, read_snapshot, read_walls
+from ..io import Overview, check_target, read_box, read_overview, read_snapshot, read_walls
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
 from ..report.force_rows import force_rows
@@ -55,8 +55,9 @@ def _show(options) -> int:
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
-        walls = read_walls(options.file)
-        save(snapshot_figure(*read_snapshot(options.file), walls=walls), options.figure)
+        around = {"walls": read_walls(options.file), "box": read_box(options.file)}
+        drawn = snapshot_figure(*read_snapshot(options.file), **around)
+        save(drawn, options.figure)
         rows["figure"] = str(options.figure)
     print_rows(rows)
     if options.json is not None:

@@ -12,6 +12,7 @@ from .saved_trajectory import save_trajectory as save_trajectory
 from .snapshot_blocks import snapshot_blocks as snapshot_blocks
 from .trajectory_file import Checkpoint as Checkpoint
 from .trajectory_file import TrajectoryFileError as TrajectoryFileError
+from .trajectory_file import read_box as read_box
 from .trajectory_file import read_checkpoint as read_checkpoint
 from .trajectory_file import read_trajectory as read_trajectory
 from .trajectory_file import read_walls as read_walls

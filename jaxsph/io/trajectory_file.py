@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from ..content import differences
+from ..domain import Box
 from ..particles import ParticleState
 from ..schedule import Schedule
 from ..trajectory import Trajectory
@@ -130,6 +131,20 @@ def read_walls(path: str | os.PathLike) -> np.ndarray | None:
     """
     with opened(Path(path)) as (file, _):
         return file["walls/position"][:] if "walls/position" in file else None
+
+
+@patient
+def read_box(path: str | os.PathLike) -> Box | None:
+    """The box of a run; None where it is not known, as of points of a reduced model.
+
+    Raises:
+        TrajectoryFileError: if the file is not a whole trajectory file.
+    """
+    with opened(Path(path)) as (file, _):
+        if "box" not in file.attrs:
+            return None
+        told = json.loads(file.attrs["box"])
+    return Box(*(tuple(told[name]) for name in ("lower", "upper", "periodic")))
 
 
 @patient

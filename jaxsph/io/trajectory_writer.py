@@ -7,6 +7,7 @@ steps says how many snapshots are whole.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -124,12 +125,15 @@ class TrajectoryWriter:
             if scene.mass is not None:
                 file.attrs["mass"] = float(scene.mass)
             text = _to_json(metadata)
-            space = max(_METADATA_SPACE, 2 * len(text))
-            file.attrs.create("metadata", np.bytes_(text), dtype=f"S{space}")
+            room = max(_METADATA_SPACE, 2 * len(text))
+            file.attrs.create("metadata", np.bytes_(text), dtype=f"S{room}")
             for name, shape in shapes.items():
                 add_dataset(file, name, shape, np.dtype(state.position.dtype), **COMPRESSION)
             add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)
             add_dataset(file, "step", (), np.dtype("int64"), fillvalue=-1)
+            space = getattr(scene, "space", None)
+            if space is not None:
+                file.attrs["box"] = json.dumps(dataclasses.asdict(space.box))
             walls = getattr(scene, "walls", None)
             if walls is not None:
                 file.create_group("walls")["position"] = np.float32(walls.fixed_position)

@@ -13,9 +13,11 @@ import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from ..io import check_target, read_walls, snapshot_blocks
+from ..domain import Box
+from ..io import check_target, read_box, read_walls, snapshot_blocks
 from ..trajectory import Trajectory
 from .fields import VELOCITY, ParticleField
+from .images import fit_box, with_images
 from .particles import draw_particles, draw_walls, fit_squares, middle_layer, spacing
 from .snapshot import label_panel, panel_size
 from .style import INK, TEXT, sheet
@@ -53,8 +55,8 @@ def animate(
         TrajectoryFileError: if the source is not a whole trajectory file with a snapshot in it, or
             the picture's folder does not serve.
     """
-    blocks, walls = partial(snapshot_blocks, source, 1), read_walls(source)
-    return draw_animation(blocks, path, field, every, frames_per_second, progress, walls)
+    blocks, walls, box = partial(snapshot_blocks, source, 1), read_walls(source), read_box(source)
+    return draw_animation(blocks, path, field, every, frames_per_second, progress, walls, box)
 
 
 def draw_animation(
@@ -65,9 +67,10 @@ def draw_animation(
     frames_per_second: int = 15,
     progress: Callable[[int], None] | None = None,
     walls: np.ndarray | None = None,
+    box: Box | None = None,
 ) -> Path:
-    """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew, and
-    with walls whose ghosts are at given places (G, n) [m]."""
+    """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew, with
+    walls whose ghosts are at given places (G, n) [m], and in a box that may be periodic."""
     path = Path(path)
     if path.suffix not in _WRITERS:
         raise ValueError(f"{path}: pictures end with {' or '.join(_WRITERS)}; name it so.")
@@ -81,14 +84,14 @@ def draw_animation(
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
         with matplotlib.rc_context(settings):
-            _draw(blocks, writer, part, field, view, progress, walls)
+            _draw(blocks, writer, part, field, view, progress, walls, box)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
     return path
 
 
-def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, progress, walls):
+def _draw(blocks, writer: AbstractMovieWriter, path, field, view: _View, progress, walls, box):
     """All frames into a picture."""
     first = next(blocks)
     corners = np.stack([view.low, view.high])
@@ -103,7 +106,8 @@ def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, p
         xlim=(view.low[0] - margin, view.high[0] + margin),
         ylim=(view.low[1] - margin, view.high[1] + margin),
     )
-    still = draw_walls(axes, walls)
+    fit_box(axes, box)
+    still, reach = draw_walls(axes, walls), 2.0 * margin
     label_panel(figure, axes, squares, field.label, extend="both")
     title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
     fit_squares(figure, [(axes, squares, *still)])
@@ -112,8 +116,9 @@ def _draw(blocks, writer: AbstractMovieWriter, path: Path, field, view: _View, p
         block = first
         while block is not None:
             position, value = _shown(block, field)
+            position, index = with_images(position, box, reach)
             squares.set_offsets(position)
-            squares.set_array(value)
+            squares.set_array(value[index])
             title.set_text(view.title(block))
             writer.grab_frame()
             if progress is not None:

@@ -12,6 +12,8 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
+from ..domain import Box
+from .images import fit_box, with_images
 from .style import FAINT, INK, SMALL, WALL
 
 OVERLAP = 1.25  # side of a square in particle spacings; disorder would leave gaps otherwise
@@ -77,10 +79,19 @@ def frame(axes: Axes, position: np.ndarray) -> None:
 
 
 def draw_particles(
-    axes: Axes, position: np.ndarray, value: np.ndarray, color_map: str, limits: tuple[float, float]
+    axes: Axes,
+    position: np.ndarray,
+    value: np.ndarray,
+    color_map: str,
+    limits: tuple[float, float],
+    box: Box | None = None,
 ) -> PathCollection:
-    """Particles (N, 2) [m] coloured by value (N,), grey where it is not finite."""
+    """Particles (N, 2) [m] coloured by value (N,), grey where it is not finite; of a periodic box
+    up to its faces."""
     frame(axes, position)
+    position, index = with_images(position, box, spacing(position))
+    value = value[index]
+    fit_box(axes, box)
     return axes.scatter(
         position[:, 0],
         position[:, 1],

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
+from ..domain import Box
 from ..trajectory import Snapshot
 from .fields import PRESSURE, VELOCITY, ParticleField
 from .particles import draw_particles, draw_walls, fit_squares, middle_layer
@@ -23,6 +24,7 @@ def snapshot_figure(
     snapshot: Snapshot,
     fields: Sequence[ParticleField] = (VELOCITY, PRESSURE),
     walls: np.ndarray | None = None,
+    box: Box | None = None,
 ) -> Figure:
     """Particles coloured by fields, side by side; of three-dimensional ones the middle layer.
 
@@ -31,6 +33,7 @@ def snapshot_figure(
         snapshot: positions (N, n) [m] and fields, as read from a file.
         fields: which ones to show.
         walls: places of the walls' ghosts (G, n) [m], drawn grey in two dimensions.
+        box: of the run; what is beyond a periodic face is drawn up to it.
     """
     shown = middle_layer(np.asarray(snapshot.position))
     position = np.asarray(snapshot.position)[shown, :2]
@@ -41,7 +44,7 @@ def snapshot_figure(
     for axes, field in zip(figure.subplots(1, len(fields), squeeze=False)[0], fields, strict=True):
         value = field.value(snapshot)[shown]
         color_map, limits = field.colours(*(finite_range([value]) or (0.0, 1.0)))
-        squares = draw_particles(axes, position, value, color_map, limits)
+        squares = draw_particles(axes, position, value, color_map, limits, box)
         label_panel(figure, axes, squares, field.label)
         axes.set_title(f"t = {time:.4g} s", fontsize=TEXT, color=INK)
         drawn.append((axes, squares, *draw_walls(axes, walls)))

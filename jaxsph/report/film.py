@@ -11,15 +11,17 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import to_hex
 
-from ..io import read_overview, read_walls, snapshot_blocks
+from ..io import read_box, read_overview, read_walls, snapshot_blocks
 from ..plotting import FIELDS, ParticleField
+from ..plotting.images import with_images
 from ..plotting.particles import OVERLAP, middle_layer, spacing
 from .film_script import SCRIPT
 
 FRAMES = 40  # at most
 _BYTES = 3_000_000  # of all frames; base64 makes a third more of them
 _TAILS = (0.01, 0.99)  # quantiles of the whole run that the colours span
-_STEPS = 65535  # of a place across the picture
+_STEPS = 65535  # of a place across the picture and what is around it
+_AROUND = 0.25  # of the picture at each side, where images stand
 
 
 def film(source: str | os.PathLike) -> str:
@@ -35,25 +37,33 @@ def film(source: str | os.PathLike) -> str:
     room = max(2, _BYTES // (overview.particles * (4 + len(fields))))
     every = -(-overview.snapshots // min(FRAMES, room))
     times, places, values = [], [], [[] for _ in fields]
+    box, reach = read_box(source), None
     for block in snapshot_blocks(source, 1, every):
         shown = middle_layer(block.position[0])
         times.append(float(block.time[0]))
-        places.append(np.asarray(block.position[0][shown, :2], np.float32))
+        place = np.asarray(block.position[0][shown, :2], np.float32)
+        reach = spacing(place) if reach is None else reach
+        place, index = with_images(place, box, reach)
+        places.append(place)
         for kept, field in zip(values, fields, strict=True):
-            kept.append(np.asarray(field.value(block)[0][shown], np.float32))
+            kept.append(np.asarray(field.value(block)[0][shown][index], np.float32))
     walls = read_walls(source)
     walls = walls if walls is not None and walls.shape[1] == 2 else np.zeros((0, 2), np.float32)
-    return _piece(times, places, values, fields, walls)
+    return _piece(times, places, values, fields, walls, box)
 
 
-def _piece(times, places, values, fields, walls) -> str:
+def _piece(times, places, values, fields, walls, box) -> str:
     everything = np.concatenate([*places, walls])
     side = OVERLAP * spacing(places[0])  # a splash has no spacing of its own
     low = np.nanmin(everything, axis=0) - 0.5 * side
-    extent = np.nanmax(everything, axis=0) + 0.5 * side - low
+    high = np.nanmax(everything, axis=0) + 0.5 * side
+    for axis in range(2):  # images are drawn up to the faces of the box
+        if box is not None and box.periodic[axis]:
+            low[axis], high[axis] = box.lower[axis], box.upper[axis]
+    extent = high - low
 
     def scaled(position: np.ndarray) -> bytes:
-        share = np.nan_to_num((position - low) / extent)
+        share = (np.nan_to_num((position - low) / extent) + _AROUND) / (1.0 + 2.0 * _AROUND)
         return np.clip(_STEPS * share, 0, _STEPS).astype("<u2").tobytes()
 
     told: dict[str, Any] = {
@@ -62,6 +72,7 @@ def _piece(times, places, values, fields, walls) -> str:
         "places": _text(b"".join(map(scaled, places))),
         "walls": _text(scaled(walls)),
         "extent": extent.tolist(),
+        "around": _AROUND,
         "side": side / float(extent[0]),
         "fields": [_field(*pair) for pair in zip(fields, values, strict=True)],
     }

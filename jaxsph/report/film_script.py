@@ -16,7 +16,8 @@ SCRIPT = """function (script, film) {
     ariaLabel: "time", value: film.times.length - 1 }), told = make("output", {});
   fields.forEach((field, k) => choice.add(new Option(field.label, k)));
   const pen = canvas.getContext("2d"), side = film.side * canvas.width;
-  const x = u => u / 65535 * canvas.width, y = u => (1 - u / 65535) * canvas.height;
+  const share = u => u / 65535 * (1 + 2 * film.around) - film.around;
+  const x = u => share(u) * canvas.width, y = u => (1 - share(u)) * canvas.height;
   const square = (u, v) => pen.fillRect(x(u) - side / 2, y(v) - side / 2, side, side);
   function draw() {
     const frame = +slider.value, field = fields[choice.value];

@@ -8,8 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
+<<<<<<< HEAD
 from ..io import read_forces, read_overview, read_snapshot, read_walls
 from ..plotting import forces_figure, history_figure, snapshot_figure
+=======
+from ..io import read_box, read_overview, read_snapshot, read_walls
+from ..plotting import history_figure, snapshot_figure
+>>>>>>> hour
 from ..plotting.style import png
 from ..walls.parts import WHOLE
 from . import page
@@ -48,13 +53,14 @@ def write_run_report(
     if overview.snapshots:
         history = read_history(trajectory, overview.particles, mass)
         time, snapshot = read_snapshot(trajectory)
+        walls = read_walls(trajectory)
         layer = ", of the middle layer" if overview.dim == 3 else ""
         pieces += [
             page.heading("The run"),
             film(trajectory),
             page.heading("Figures"),
             page.figure(
-                png(snapshot_figure(time, snapshot, walls=read_walls(trajectory))),
+                png(snapshot_figure(time, snapshot, walls=walls, box=read_box(trajectory))),
                 f"Velocity norm and pressure at the last snapshot, t = {time:g} s{layer}.",
             ),
             page.figure(

@@ -157,11 +157,11 @@ def _figures(trained: TrainedModel, prediction: Prediction) -> list[tuple[bytes,
         coordinates, time = prediction.coordinates[0, last - 1 : last], prediction.time[last - 1]
         fluid = trained.fluid(prediction.values[0])
         fields = trained.flow.fields(coordinates, np.array([time]), fluid=fluid)
-        walls = trained.functional.walls
+        walls, box = trained.functional.walls, trained.flow.reference.space.box
         places = None if walls is None else np.asarray(walls.fixed_position)
         named = said({n: float(v[0]) for n, v in prediction.parameters.items()})
         caption = f"Velocity norm and pressure at the reference points, {named}, t = {time:g} s."
-        drawn = snapshot_figure(float(time), fields.snapshot(0), walls=places)
+        drawn = snapshot_figure(float(time), fields.snapshot(0), walls=places, box=box)
         shown.append((png(drawn), caption))
     percent = 100.0 * np.asarray(prediction.error_indicator)
     if len(prediction.names) == 1 and len(prediction) > 1 and np.isfinite(percent).any():

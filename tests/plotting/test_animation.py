@@ -62,8 +62,9 @@ def test_frames_show_the_snapshots_on_one_scale(tmp_path, monkeypatch):
     titles, scales, positions, values = zip(*watch.frames, strict=True)
     interval = run.time[2]
     assert titles == tuple(f"taylor-green, t = {k * interval:.3f} s" for k in range(3))
-    np.testing.assert_array_equal(positions, run.position[::2])
-    np.testing.assert_array_equal(values, run.density[::2])
+    assert all(len(frame) > 256 for frame in positions)  # images stand behind the particles
+    np.testing.assert_array_equal([frame[:256] for frame in positions], run.position[::2])
+    np.testing.assert_array_equal([frame[:256] for frame in values], run.density[::2])
     assert len(set(scales)) == 1
     across, up, colours = scales[0]
     shown = run.position[::2]

@@ -5,7 +5,7 @@ import pytest
 
 from jaxsph.history import read_history
 from jaxsph.io import read_snapshot
-from jaxsph.plotting import FIELDS, history_figure, save, snapshot_figure
+from jaxsph.plotting import FIELDS, history_figure, save, snapshot_figure, vorticity
 from jaxsph.plotting.particles import middle_layer
 from tests.runs import random_run
 
@@ -14,14 +14,15 @@ def test_snapshot(tmp_path):
     time, snapshot = read_snapshot(random_run(tmp_path / "t.h5"), 2)
     figure = snapshot_figure(time, snapshot, tuple(FIELDS.values()))
     panels = [axes for axes in figure.axes if axes.get_title()]
-    values = [np.linalg.norm(snapshot.velocity, axis=1), snapshot.pressure, snapshot.density]
+    values = [np.linalg.norm(snapshot.velocity, axis=1), snapshot.pressure, snapshot.density,
+              vorticity(snapshot.position, snapshot.velocity)]  # fmt: skip
     for axes, value in zip(panels, values, strict=True):
         (squares,) = axes.collections
         np.testing.assert_array_equal(squares.get_offsets(), snapshot.position)
         np.testing.assert_array_equal(squares.get_array(), value)
         assert axes.get_title() == f"t = {time:.4g} s" and axes.get_xlabel() == "x [m]"
     labels = [axes.get_ylabel() for axes in figure.axes if axes not in panels]
-    assert labels == ["velocity norm [m/s]", "pressure [Pa]", "density [kg/m$^3$]"]
+    assert labels == [field.label for field in FIELDS.values()]
     low, high = panels[1].collections[0].get_clim()
     assert low == -high  # pressure has both signs
     assert save(figure, tmp_path / "f.png").stat().st_size > 1000
