@@ -8,13 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-<<<<<<< HEAD
-from ..io import read_forces, read_overview, read_snapshot, read_walls
+from ..io import read_box, read_forces, read_overview, read_snapshot, read_walls
 from ..plotting import forces_figure, history_figure, snapshot_figure
-=======
-from ..io import read_box, read_overview, read_snapshot, read_walls
-from ..plotting import history_figure, snapshot_figure
->>>>>>> hour
 from ..plotting.style import png
 from ..walls.parts import WHOLE
 from . import page
