@@ -9,8 +9,9 @@ from typing import Any
 
 from ..history import energy_unit, read_history
 from ..io import read_box, read_overview, read_snapshot, read_walls
-from ..plotting import history_figure, snapshot_figure
+from ..plotting import depth_figure, history_figure, snapshot_figure
 from ..plotting.style import png
+from ..trajectory import Snapshot
 from . import page
 from .film import film
 from .settings import origin_rows, scene_rows
@@ -52,6 +53,7 @@ def write_run_report(
                 png(snapshot_figure(time, snapshot, walls=walls, box=read_box(trajectory))),
                 f"Velocity norm and pressure at the last snapshot, t = {time:g} s{layer}.",
             ),
+            *(_in_space(time, snapshot) if overview.dim == 3 else ()),
             page.figure(
                 png(history_figure(history, energy_unit(overview.dim))),
                 "Kinetic energy of all particles, and the lowest and the highest density of one, "
@@ -61,3 +63,8 @@ def write_run_report(
     pieces += [page.heading("Scene and settings"), page.rows(scene_rows(overview))]
     pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     return page.write_page(path, f"jaxsph: {overview.scene}", pieces)
+
+
+def _in_space(time: float, snapshot: Snapshot) -> list[str]:
+    told = f"The fastest quarter of all particles, t = {time:g} s."
+    return [page.figure(png(depth_figure(time, snapshot)), told)]
