@@ -107,7 +107,9 @@ def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
     scene = make_scene(case)
     before = None
     if case["before"]:
-        rough = case | {"resolution": case["resolution"] // 2, "end_time": case["before"]}
+        rough = case | {
+            "resolution": case["resolution"] // 2, "before": 0.0, "end_time": case["before"]
+        }  # fmt: skip
         coarse = make_scene(rough, 2.0 * TIME_STEP[case["resolution"]])
         before = full_run(_folder(folder, rough), coarse, progress)
         scene = with_record(scene, before=case["before"])
@@ -141,7 +143,8 @@ def run(case: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _folder(folder: Path, case: dict[str, Any]) -> Path:
-    return folder / f"{case['lid']}-{case['resolution']}-{case['end_time']:g}s"
+    after = f"-after-{case['before']:g}s" if case["before"] else ""
+    return folder / f"{case['lid']}-{case['resolution']}-{case['end_time']:g}s{after}"
 
 
 def _change(trajectory: Trajectory) -> float:

@@ -25,8 +25,10 @@ def pages() -> dict[str, str]:
     """Markdown by the path of each page."""
     sizes = {name: (summary, sizes) for name, summary, sizes in scenes()}
     found = {f"scenes/{name}.md": page(name, sizes[name][1]) for name in SCENES}
-    lines = "\n".join(f"| [{name}]({name}.md) | {told} |" for name, (told, _) in sizes.items())
-    head = "# Scenes\n\n`jaxsph run SCENE` runs one.\n\n| Scene | What it is |\n|---|---|"
+    lines = "\n".join(
+        f"| [{name}]({name}.md) | {told} | {_small(name)} |" for name, (told, _) in sizes.items()
+    )
+    head = "# Scenes\n\n`jaxsph run SCENE` runs one.\n\n| Scene | What it is | |\n|---|---|---|"
     return {"scenes/index.md": f"{head}\n{lines}\n", **found}
 
 
@@ -79,6 +81,11 @@ def _values(action) -> str:
 
 def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+
+
+def _small(name: str) -> str:
+    found = picture(name)
+    return "" if found is None else f"![{name}](../figures/{found}){{ width=180 }}"
 
 
 def picture(name: str) -> str | None:

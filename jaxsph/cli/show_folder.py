@@ -8,6 +8,7 @@ from ..io import read_overview
 from ..io.trajectory_file import FORMAT
 from .options import bytes_in, bytes_told
 from .show_contents import file_format
+from .show_other import other_contents
 
 _LISTED = 40  # files and folders
 # formats of HDF5 files: what it is, and the command that looks at it
@@ -19,7 +20,6 @@ _OF_FORMAT = {
 }
 _OF_ENDING = {
     ".html": ("a page for a browser", "open {} in a browser"),
-    ".toml": ("options of a command", "jaxsph show {}"),
     ".json": ("results as JSON", "jaxsph show {}"),
     ".png": ("a picture", "open {}"),
     ".pdf": ("a picture", "open {}"),
@@ -56,12 +56,22 @@ def _told(path: Path) -> str:
 
 
 def _kind(path: Path) -> tuple[str, str]:
+    if path.suffix == ".toml":
+        return "options of a command", _again(path)
     if path.suffix in _OF_ENDING:
         return _OF_ENDING[path.suffix]
     found = file_format(path)
     if found == FORMAT:
         return _run(path), "jaxsph animate {}"
     return _OF_FORMAT.get(found or "", ("not a file of this project", ""))
+
+
+def _again(path: Path) -> str:
+    """The command that repeats what left a `run.toml`."""
+    try:
+        return (other_contents(path) or {}).get("run again by", "jaxsph show {}")
+    except ValueError:
+        return ""
 
 
 def _run(path: Path) -> str:

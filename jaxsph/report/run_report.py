@@ -8,10 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
+<<<<<<< HEAD
 from ..io import read_box, read_forces, read_overview, read_snapshot, read_walls
 from ..plotting import forces_figure, history_figure, snapshot_figure
 from ..plotting.style import png
 from ..walls.parts import WHOLE
+=======
+from ..io import read_box, read_overview, read_snapshot, read_walls
+from ..plotting import depth_figure, history_figure, snapshot_figure
+from ..plotting.style import png
+from ..trajectory import Snapshot
+>>>>>>> hour
 from . import page
 from .film import film
 from .settings import origin_rows, scene_rows
@@ -58,6 +65,7 @@ def write_run_report(
                 png(snapshot_figure(time, snapshot, walls=walls, box=read_box(trajectory))),
                 f"Velocity norm and pressure at the last snapshot, t = {time:g} s{layer}.",
             ),
+            *(_in_space(time, snapshot) if overview.dim == 3 else ()),
             page.figure(
                 png(history_figure(history, energy_unit(overview.dim))),
                 "Kinetic energy of all particles, and the lowest and the highest density of one, "
@@ -70,3 +78,8 @@ def write_run_report(
     pieces += [page.heading("Scene and settings"), page.rows(scene_rows(overview))]
     pieces += [page.heading("How this came about"), page.rows(origin_rows(environment, command))]
     return page.write_page(path, f"jaxsph: {overview.scene}", pieces)
+
+
+def _in_space(time: float, snapshot: Snapshot) -> list[str]:
+    told = f"The fastest quarter of all particles, t = {time:g} s."
+    return [page.figure(png(depth_figure(time, snapshot)), told)]

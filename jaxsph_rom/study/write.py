@@ -228,11 +228,14 @@ def _fields(runs: FullRuns, outcomes: Sequence[Outcome], folder: Path, time: flo
                 label = f"{_label(outcome.case)}, M = {outcome.case.modes}"
                 row = outcome.trajectory.nearest(full.time[k])
                 rows.append(_row(label, outcome.trajectory, row))
-        file = field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png")
+        scene = runs.scene(reynolds)
+        walls = None if scene.walls is None else np.asarray(scene.walls.fixed_position)
+        around = {"walls": walls, "box": scene.space.box}
+        file = field_snapshots(rows, folder / f"fields_re_{reynolds:g}.png", **around)
         caption = f"Velocity norm and pressure at Re {reynolds:g}, t = {full.time[k]:.4g} s."
         shown.append((file, caption))
         if len(rows) > 1:
-            file = field_differences(rows, folder / f"differences_re_{reynolds:g}.png")
+            file = field_differences(rows, folder / f"differences_re_{reynolds:g}.png", **around)
             caption = f"Reduced minus full at Re {reynolds:g}, t = {full.time[k]:.4g} s."
             shown.append((file, caption))
     return shown

@@ -156,13 +156,18 @@ def test_show_of_a_folder(capsys):
     random_run("a/t.h5", finish=True)
     layout = {"starts": ("runs modes", "coordinate")}
     write_whole("a/m.h5", ("jaxsph reduced flow", 1), layout, {"starts": np.ones((2, 3))}, {})
+    Path("a/run.toml").write_text("# jaxsph run --config run.toml --out DIR runs this again\n")
+    Path("a/broken.toml").write_text("=")
     for name in ("notes.txt", "report.html", ".hidden"):
         Path("a", name).write_text("<title>x</title>")
     for program in (main, reduced_main):
         assert program(["show", "a", "--json", "shown.json"]) == 0
         rows = shown(capsys)
-        assert list(rows) == ["m.h5", "notes.txt", "report.html", "t.h5", "full/"]
+        assert list(rows) == ["broken.toml", "m.h5", "notes.txt", "report.html", "run.toml", "t.h5",
+                              "full/"]  # fmt: skip
         assert json.loads(Path("shown.json").read_text()) == rows
+    assert rows["run.toml"].endswith(": jaxsph run --config a/run.toml --out DIR")
+    assert rows["broken.toml"] == "options of a command, 1 B"
     assert rows["t.h5"].startswith("a run of taylor-green, 5 snapshots, complete, ")
     assert rows["t.h5"].endswith(": jaxsph animate a/t.h5")
     assert rows["m.h5"].startswith("a reduced model, ")

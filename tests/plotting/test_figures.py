@@ -5,7 +5,7 @@ import pytest
 
 from jaxsph.history import read_history
 from jaxsph.io import read_snapshot
-from jaxsph.plotting import FIELDS, history_figure, save, snapshot_figure, vorticity
+from jaxsph.plotting import FIELDS, depth_figure, history_figure, save, snapshot_figure, vorticity
 from jaxsph.plotting.particles import middle_layer
 from tests.runs import random_run
 
@@ -53,3 +53,16 @@ def test_one_value_only_has_colours_too():
     assert FIELDS["pressure"].colours(-2.0, 1.0)[1] == (-2.0, 2.0)
     assert FIELDS["pressure"].colours(1.0, 2.0)[1] == (1.0, 2.0)
     assert FIELDS["pressure"].colours(-1.0, 20.0) == ("viridis", (-1.0, 20.0))
+
+
+def test_points_by_depth(tmp_path):
+    time, snapshot = read_snapshot(random_run(tmp_path / "t.h5", dim=3))
+    figure = depth_figure(time, snapshot)
+    (points,) = figure.axes[0].collections
+    speed = np.linalg.norm(snapshot.velocity, axis=1)
+    shown = points.get_array()
+    assert len(shown) == round(0.25 * len(speed)) and shown.min() >= np.quantile(speed, 0.74)
+    assert save(figure, tmp_path / "f.png").stat().st_size > 1000
+    flat = read_snapshot(random_run(tmp_path / "flat.h5"))
+    with pytest.raises(ValueError, match="have a depth"):
+        depth_figure(*flat)

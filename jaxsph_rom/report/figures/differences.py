@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from jaxsph.plotting.particles import draw_particles, fit_squares, plane
+from jaxsph import Box
+from jaxsph.plotting.particles import draw_particles, draw_walls, fit_squares, plane
 from jaxsph.plotting.style import INK, SIGNED_MAP, SMALL, TEXT, finite_range, save, sheet
 
 from .snapshots import PANEL, Row
@@ -20,7 +21,12 @@ _RIDGE = 1e-9  # of a slope that particles do not determine
 _NAMES = ("velocity norm [m/s]", "pressure [Pa]")
 
 
-def field_differences(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path:
+def field_differences(
+    rows: Sequence[Row],
+    path: str | os.PathLike[str],
+    walls: np.ndarray | None = None,
+    box: Box | None = None,
+) -> Path:
     """Reduced minus full, a column for each reduced run: velocity norm above, pressure below.
 
     The full run's values are taken to the reduced run's places by linear fits. Each panel's colours
@@ -30,6 +36,8 @@ def field_differences(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path
         rows: label, positions (N, 2) [m], velocity norm (N,) [m/s], pressure (N,) [Pa] of each
             run, the full one first.
         path: the file to write.
+        walls: places of the walls' ghosts (G, 2) [m], drawn grey.
+        box: of the runs; what is beyond a periodic face is drawn up to it.
     """
     if len(rows) < 2:
         raise ValueError(f"rows: got {len(rows)}; give the full run and at least one other.")
@@ -49,11 +57,11 @@ def field_differences(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path
             axes, apart = grid[line, column], np.asarray(value) - wanted[:, line]
             low, high = finite_range([apart]) or (0.0, 0.0)
             most = max(-low, high) or 1.0
-            squares = draw_particles(axes, position, apart, SIGNED_MAP, (-most, most))
+            squares = draw_particles(axes, position, apart, SIGNED_MAP, (-most, most), box)
             bar = figure.colorbar(squares, ax=axes, pad=0.02, aspect=16)
             bar.set_label(f"difference in {name}", fontsize=SMALL, color=INK)
             bar.ax.tick_params(labelsize=SMALL, colors=INK)
-            drawn.append((axes, squares))
+            drawn.append((axes, squares, *draw_walls(axes, walls)))
         grid[0, column].set_title(label, fontsize=TEXT, color=INK)
         grid[1, column].set_xlabel("x [m]", fontsize=TEXT, color=INK)
     for line in grid:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxsph.plotting.particles import draw_particles, fit_squares, plane
+from jaxsph import Box
+from jaxsph.plotting.particles import draw_particles, draw_walls, fit_squares, plane
 from jaxsph.plotting.style import (
     INK,
     MAGNITUDE_MAP,
@@ -27,7 +28,12 @@ PANEL = 2.6  # side of a square panel [inch]
 Row = tuple[str, np.ndarray, np.ndarray, np.ndarray]
 
 
-def field_snapshots(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path:
+def field_snapshots(
+    rows: Sequence[Row],
+    path: str | os.PathLike[str],
+    walls: np.ndarray | None = None,
+    box: Box | None = None,
+) -> Path:
     """Velocity norm above and pressure below, a column per run, one colour scale per quantity.
 
     The first run is the reference: the scale ends a third of its range beyond it, so that a run
@@ -36,6 +42,8 @@ def field_snapshots(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path:
     Args:
         rows: label, positions (N, 2) [m], velocity norm (N,) [m/s], pressure (N,) [Pa] of each.
         path: the file to write.
+        walls: places of the walls' ghosts (G, 2) [m], drawn grey.
+        box: of the runs; what is beyond a periodic face is drawn up to it.
     """
     if not rows:
         raise ValueError("rows: got none; give at least one run")
@@ -61,8 +69,8 @@ def field_snapshots(rows: Sequence[Row], path: str | os.PathLike[str]) -> Path:
                     f"rows: {row[0]!r} has {name} of shape {value.shape}; "
                     f"give ({len(position)},), one value per particle"
                 )
-            squares = draw_particles(axes, position, value, color_map, (low, high))
-            drawn.append((axes, squares))
+            squares = draw_particles(axes, position, value, color_map, (low, high), box)
+            drawn.append((axes, squares, *draw_walls(axes, walls)))
             if column == 2:
                 axes.set_title(row[0], fontsize=TEXT, color=INK)
             else:

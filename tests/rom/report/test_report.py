@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 
+from jaxsph import Box
 from jaxsph.plotting.style import shared_limits
 from jaxsph_rom.report import (
     Case,
@@ -327,7 +328,10 @@ def test_differences_are_taken_where_the_reduced_run_is(tmp_path):
     full = ("full", position, np.ones(400), np.zeros(400))
     reduced = ("reduced", points, np.full(50, 1.5), np.full(50, -2.0))
     lost = ("lost", np.full((50, 2), np.nan), np.ones(50), np.ones(50))
-    path = field_differences([full, reduced, lost], tmp_path / "d.png")
+    walls = np.array([[x, -0.05] for x in np.linspace(0.0, 1.0, 21)])
+    around = {"walls": walls, "box": Box((0.0, 0.0), (1.0, 1.0), (True, False))}
+    path = field_differences([full, reduced, lost], tmp_path / "d.png", **around)
+    assert field_snapshots([full, reduced], tmp_path / "f.png", **around).exists()
     assert path.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="rows: got 1"):
         field_differences([full], path)
