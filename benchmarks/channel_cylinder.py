@@ -2,8 +2,9 @@
 
     python -m benchmarks.channel_cylinder --resolutions 33 41 66
 
-Means and standard deviations of the coefficients over the second half of each run, whose force is
-taken every few steps; of the pressure before the cylinder less that behind it; and by how much the
+Means of the coefficients over the second half of each run, of every stage of every step; how they
+deviate from few steps to few steps, and how well their mean is known, by the spread of eight parts
+of that time; means of the pressure before the cylinder less that behind it; and by how much the
 mass flux along the channel is off at the worst of its sections. Every finished run's row is in the
 JSON file at once; the same command goes on where it was cut short.
 """
@@ -33,7 +34,8 @@ LITERATURE = {  # at Re = 20; pascals
     "drag": (5.57, 5.59), "lift": (0.0104, 0.0110), "pressure_difference": (0.1172, 0.1176)
 }  # fmt: skip
 SECTIONS = 11  # of the channel
-EACH = 5  # steps from force to force, or fewer
+EACH = 5  # steps over which forces are means, or fewer
+BLOCKS = 8  # parts of the second half
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -74,15 +76,20 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     scene = dataclasses.replace(scene, steps_per_snapshot=each)
     with progress(f"{case['resolution']} across", scene.steps) as report:
         trajectory = run_scene(scene, progress=report)
-    late = trajectory.time >= 0.5 * trajectory.time[-1]
-    coefficients = 2.0 * trajectory.forces["cylinder"][late] / (MEAN**2 * DIAMETER)
+    late = trajectory.time > (0.5 + 1e-9) * trajectory.time[-1]
+    coefficients = 2.0 * trajectory.mean_forces["cylinder"][late] / (MEAN**2 * DIAMETER)
     mean, deviation = coefficients.mean(axis=0), coefficients.std(axis=0)
+    blocks = [part.mean(axis=0) for part in np.array_split(coefficients, BLOCKS) if len(part)]
+    known = np.std(blocks, axis=0) / np.sqrt(len(blocks))
     return {
         "across_cylinder": DIAMETER / scene.space.spacing,
         "drag": float(mean[0]),
         "drag_deviation": float(deviation[0]),
+        "drag_known_to": float(known[0]),
         "lift": float(mean[1]),
         "lift_deviation": float(deviation[1]),
+        "lift_known_to": float(known[1]),
+        "averaged": True,
         "pressure_difference": pressure_difference(scene.space, trajectory, late),
         "mass_flux_off_percent": 100.0 * flux_off(float(scene.mass), trajectory, late),
         "forces_taken": int(late.sum()),

@@ -120,10 +120,6 @@ AT_END = Bound(
     "energy left", energy_left, 1e-3,
     "nothing comes in any more, and friction has had 4 pi^2 nu / H^2 = 4 1/s for 2 s",
 )  # fmt: skip
-FLUSH = Bound(
-    "density", density_deviation, 0.1,
-    "a body that is set going at once starts with a jump of rho0 c0 U at its surface",
-)  # fmt: skip
 
 SPLASH = (LOOSE_DENSITY, FALL, JET, WALLS)
 PATCH = (DENSITY, DECAY)
@@ -137,6 +133,6 @@ CAVITY = (DENSITY, DRIVEN, LID_SPEED, WALLS, DISTANCE, EVEN)
 CHANNEL = (DENSITY, CHANNEL_SPEED, WALLS, DISTANCE, EVEN)
 PULSED = (DENSITY, INFLOW_SPEED, WALLS, DISTANCE, EVEN)
 STOPPED = (*PULSED, AT_END)
-FLUSHED = (FLUSH, FAST, WALLS, DISTANCE, EVEN)
+STRUCK = (LOOSE_DENSITY, FAST, WALLS, DISTANCE, EVEN)
 TANK = (DENSITY, STILL, HYDROSTATIC, WALLS, DISTANCE, EVEN)
 SCATTERED = (LOOSE_DENSITY, FAST)

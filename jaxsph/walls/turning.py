@@ -37,6 +37,8 @@ class Turning(eqx.Module):
             held: which ghosts are of each part (K, G), all walls first.
             points: which points of the surface are (K, C).
         """
+        if not velocity.any():
+            return None
         fits, taken, left = [], [], np.ones(points.shape[1], bool)
         for own, there in zip(held[::-1], points[::-1], strict=True):
             fit = _turn(place[own], velocity[own])
