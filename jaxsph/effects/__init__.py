@@ -38,3 +38,4 @@ from .wall_repulsion import WallRepulsion as WallRepulsion
 from .wall_velocity import FixedWallVelocity as FixedWallVelocity
 from .wall_velocity import FreeSlip as FreeSlip
 from .wall_velocity import NoSlip as NoSlip
+from .wetted_walls import WettedWalls as WettedWalls

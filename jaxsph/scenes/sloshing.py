@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from ..arrangements import Arrangement, Lattice
 from ..domain import Box
-from ..effects import Gravity, LaminarViscosity, MovingFrame
+from ..effects import Gravity, LaminarViscosity, MovingFrame, WettedWalls
 from ..kernels import Kernel
 from ..record import record
 from ..schemes import Consistent, Scheme
@@ -172,7 +172,7 @@ def sloshing(
 
     return composed(
         "sloshing",
-        effects=effects,
+        effects=(*effects, WettedWalls()),
         box=Box((0.0, 0.0), (LENGTH, TOP), (False, False)),
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,

@@ -53,7 +53,8 @@ class LabelBasis(eqx.Module):
         squares, vectors = np.linalg.eigh(away @ away.T)
         sigma = np.sqrt(np.maximum(squares[::-1], 0.0))
         # the squares are known to round-off: half the digits of the values
-        rank = int(np.count_nonzero(sigma > np.sqrt(np.finfo(sigma.dtype).eps) * sigma[0]))
+        noise = np.sqrt(len(away) * np.finfo(sigma.dtype).eps) * sigma[0]
+        rank = int(np.count_nonzero(sigma > noise))
         count = min(modes, rank)
         phi = away.T @ (vectors[:, ::-1][:, :count] / sigma[:count])
         return cls(phi, centre, scale, sigma)
