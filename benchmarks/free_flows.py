@@ -25,11 +25,14 @@ from jaxsph.cli import positive_int
 from jaxsph.effects import FreeSlip
 from jaxsph.environment import environment
 from jaxsph.integrate import AutomaticSteps, FixedSteps
+from jaxsph.metrics import surface_height
 from jaxsph.scenes import SCENES, Scene
 from jaxsph.scenes.dam_break import GRAVITY, dam_break
 from jaxsph.scenes.elliptic_drop import semi_axes
 from jaxsph.scenes.gresho_vortex import gresho_velocity
 from jaxsph.scenes.piston_wave_maker import wave_height, wave_number
+from jaxsph.scenes.sloshing import DEPTH as WATER
+from jaxsph.scenes.sloshing import SPEED, linear_elevation
 from jaxsph.scenes.standing_wave import damping
 from jaxsph.schemes import Scheme
 
@@ -51,6 +54,7 @@ STEPPING = {"dam-break-impact": AutomaticSteps()}  # jets are faster than fixed 
 RESOLUTIONS = {
     "dam-break": (75, 150),
     "dam-break-impact": (161, 242),
+    "sloshing": (38, 76),
     "standing-wave": (40, 80),
     "elliptic-drop": (25, 50),
     "oscillating-drop": (40, 60),
@@ -237,6 +241,24 @@ def _standing_wave(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
+def _sloshing(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """The wave gauge at the left wall against linear theory, its level at rest left out."""
+    amplitude, frequency, reynolds = (
+        scene.parameters[name] for name in ("amplitude", "frequency", "reynolds")
+    )
+    viscosity = SPEED * WATER / reynolds
+    wanted = linear_elevation(0.0, trajectory.time, amplitude, frequency, viscosity)
+    height = surface_height(trajectory, scene, 0.0)
+    off = height - wanted
+    off -= off.mean()
+    return {
+        "measure": "wave at the wall, root mean square relative to linear theory [percent]",
+        "error_percent": 100.0 * float(np.sqrt(np.mean(off**2) / np.mean(wanted**2))),
+        "height_over_linear": float(np.ptp(height) / np.ptp(wanted)),
+        "level_change_percent": 100.0 * float((height - wanted).mean() / WATER - 1.0),
+    }
+
+
 def _elliptic_drop(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     """The semi-axes, from second moments, against the exact ones; and the period."""
     moments = 2.0 * np.sqrt((trajectory.position**2).mean(axis=1))
@@ -347,6 +369,7 @@ def _gresho(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
 MEASURES: dict[str, Callable[[Scene, Trajectory], dict[str, Any]]] = {
     "dam-break": _dam_break,
     "dam-break-impact": _impact,
+    "sloshing": _sloshing,
     "standing-wave": _standing_wave,
     "elliptic-drop": _elliptic_drop,
     "oscillating-drop": _oscillating_drop,

@@ -404,12 +404,66 @@ def _time(seconds: float) -> str:
     return f"{short(seconds)} s" if seconds >= 0.05 else f"{short(1e3 * seconds)} ms"
 
 
+def label_models() -> str:
+    """Models on labels at the parameters that they have not seen."""
+    header = ("wave", "particles", "modes", "at", "height off by %", "mean %", "floor %",
+              "sound %", "velocity %", "times faster")  # fmt: skip
+    rows = [
+        (
+            row["scene"],
+            str(row["particles"]),
+            str(row["modes"]),
+            ", ".join(f"{name} {value:g}" for name, value in row["parameters"].items())
+            + (" (outside)" if row["outside"] else ""),
+            *(
+                short(row[f"{name}_percent"])
+                for name in ("height_error", "height_error_mean", "height_floor", "sound",
+                             "velocity_median")
+            ),
+            f"{row['times_faster']:.0f}",
+        )
+        for row in results("label_models")
+        if row["model"] == "labels" and not row["seen"]
+    ]  # fmt: skip
+    return markdown(header, rows)
+
+
+def label_galerkin() -> str:
+    """The projected functional beside the learnt model of the same flow."""
+    rows = results("label_models")
+    lines = []
+    for row in rows:
+        if row["model"] != "galerkin":
+            continue
+        same = ("scene", "resolution", "modes", "parameters")
+        learnt = next(
+            r for r in rows if r["model"] == "labels" and all(r[k] == row[k] for k in same)
+        )
+        lines += [
+            (
+                f"{row['scene']}, {learnt['particles']} particles",
+                kind,
+                *(short(value) for value in found["height_error_by_period_percent"][::3]),
+                short(found["reached_periods"]),
+            )
+            for kind, found in (("Galerkin", row), (f"learnt, M = {row['modes']}", learnt))
+        ]
+    header = ("wave", "model", "period 1", "4", "7", "10", "periods reached")
+    return markdown(header, lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
+<<<<<<< HEAD
         schemes, scheme_models, settled_cavity, cavity_of_pysph, still_water, free_flows,
         particle_vortex, particle_cavity, predicted_vortex, predicted_cavity, particle_step,
         versions, cheapest_settings,
+=======
+        schemes, scheme_models, settled_cavity, still_water, free_flows, particle_vortex,
+        particle_cavity, predicted_vortex, predicted_cavity, particle_step, versions,
+        cheapest_settings, label_models, label_galerkin,
+>>>>>>> free
     )  # fmt: skip
 }
 

@@ -3,6 +3,7 @@
 What this package and the packages inside it hand on is public; modules inside these may change.
 """
 
+from . import labels as labels
 from . import points as points
 from .basis import Basis as Basis
 from .basis import Centring as Centring

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.references.lid_driven_cavity import constant_lid, solve
-from jaxsph.metrics import local_quadratic, phase_error
+from jaxsph import Trajectory
+from jaxsph.metrics import local_quadratic, phase_error, surface_height
+from jaxsph.scenes import hydrostatic_tank, standing_wave
 
 
 def test_a_wave_that_is_ahead():
@@ -29,6 +31,35 @@ def test_what_is_steady_has_no_phase():
 def test_a_phase_needs_even_times():
     with pytest.raises(ValueError, match="four evenly spaced times"):
         phase_error(np.array([0.0, 1.0, 2.0, 4.0]), np.zeros((4, 1)), np.zeros((4, 1)))
+
+
+@pytest.mark.parametrize("make", [standing_wave, hydrostatic_tank])
+def test_a_gauge_sees_columns_that_were_stretched(make):
+    """Heights H (1 + e cos k x) of columns a spacing apart, at periodic faces and at walls."""
+    scene, stretched, k = make(40), 0.1, np.pi
+    start = np.asarray(scene.state.position)
+    share = 1.0 + stretched * np.cos(k * start[:, 0])
+    position = (start * np.stack([np.ones_like(share), share], axis=1))[None]
+    density = (1000.0 / share)[None]
+    run = Trajectory(np.zeros(1), position, 0.0 * position, density, density)
+    for gauge in (0.0, 0.3, 1.0):
+        seen = stretched * np.exp(-0.5 * (k * scene.space.spacing) ** 2) * np.cos(k * gauge)
+        found = surface_height(run, scene, gauge)
+        np.testing.assert_allclose(found, [1.0 + seen], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("gauge", "width", "message"),
+    [(3.0, None, "gauge: 3 m is outside"), ((0.1, 0.1), None, "gauge: 1 horizontal"),
+     (0.1, 0.0, "width: must be positive")],
+)  # fmt: skip
+def test_gauges_that_see_nothing_are_named(gauge, width, message):
+    scene = hydrostatic_tank(20)
+    state = scene.state
+    run = Trajectory(np.zeros(1), state.position[None], state.velocity[None], state.density[None],
+                     state.density[None])  # fmt: skip
+    with pytest.raises(ValueError, match=message):
+        surface_height(run, scene, gauge, width)
 
 
 def test_quadratic_fits_are_exact_for_quadratic_fields():

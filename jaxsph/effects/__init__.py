@@ -10,6 +10,7 @@ from .body_force import BodyForce as BodyForce
 from .body_force import CentralForce as CentralForce
 from .body_force import Gravity as Gravity
 from .body_force import KickAndHold as KickAndHold
+from .body_force import MovingFrame as MovingFrame
 from .consistent_transport import ConsistentTransport as ConsistentTransport
 from .consistent_viscosity import ConsistentViscosity as ConsistentViscosity
 from .continuity import Continuity as Continuity
@@ -38,3 +39,4 @@ from .wall_repulsion import WallRepulsion as WallRepulsion
 from .wall_velocity import FixedWallVelocity as FixedWallVelocity
 from .wall_velocity import FreeSlip as FreeSlip
 from .wall_velocity import NoSlip as NoSlip
+from .wetted_walls import WettedWalls as WettedWalls

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -84,6 +85,23 @@ class CentralForce(BodyForce):
     def potential(self, time, position):
         center = jnp.asarray(self.center, position.dtype)[None, :]
         return 0.5 * self.frequency**2 * jnp.sum((position - center) ** 2, axis=1)
+
+
+class MovingFrame(BodyForce):
+    """b = -d''(t): inertia in the frame of a vessel that is moved as a whole by d(t).
+
+    A shaken tank is then one at rest, whose ghosts stay where they are. d'' is the forward
+    derivative of d, so that it fits any d, as for `MovingBody`.
+
+    Args:
+        displacement: time [s] -> d (n,) [m], with `jax.numpy`, twice differentiable.
+    """
+
+    displacement: Callable[[Array], Array]
+
+    def acceleration(self, time, position):
+        second = jax.jacfwd(jax.jacfwd(self.displacement))(time)
+        return jnp.broadcast_to(-second[None, :], position.shape)
 
 
 class KickAndHold(BodyForce):

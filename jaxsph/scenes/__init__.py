@@ -23,6 +23,7 @@ from .rotating_square_patch import rotating_square_patch as rotating_square_patc
 from .scales import Scale as Scale
 from .scene import Scene as Scene
 from .shear_layer import shear_layer as shear_layer
+from .sloshing import sloshing as sloshing
 from .solution import Solution as Solution
 from .standing_wave import standing_wave as standing_wave
 from .taylor_green import taylor_green as taylor_green
@@ -45,5 +46,6 @@ SCENES = {
     "piston-wave-maker": piston_wave_maker,
     "rotating-square-patch": rotating_square_patch,
     "shear-layer": shear_layer,
+    "sloshing": sloshing,
     "standing-wave": standing_wave,
 }

@@ -2,6 +2,7 @@
 
 from .dynamics import QDEIM as QDEIM
 from .dynamics import Chosen as Chosen
+from .dynamics import Closable as Closable
 from .dynamics import Coefficients as Coefficients
 from .dynamics import Dynamics as Dynamics
 from .dynamics import EnergyBound as EnergyBound

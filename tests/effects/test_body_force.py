@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph.effects import Gravity, KickAndHold
+from jaxsph.effects import Gravity, KickAndHold, MovingFrame
 
 
 def test_the_kick_and_what_is_held_after_it():
@@ -40,3 +40,12 @@ def test_gravity_is_the_same_everywhere():
     b = jnp.asarray([0.5, -9.81, 0.0])
     found = Gravity(b).acceleration(jnp.asarray(3.0), jnp.ones((4, 3)))
     np.testing.assert_array_equal(found, np.broadcast_to(b, (4, 3)))
+
+
+def test_the_inertia_of_a_moving_frame():
+    """-d'' of d = (a t^3, b cos t)."""
+    frame = MovingFrame(lambda t: jnp.stack([0.5 * t**3, 2.0 * jnp.cos(t)]))
+    found = frame.acceleration(jnp.asarray(2.0), jnp.zeros((3, 2)))
+    np.testing.assert_allclose(found, np.broadcast_to([-6.0, 2.0 * np.cos(2.0)], (3, 2)))
+    single = frame.acceleration(jnp.asarray(2.0, jnp.float32), jnp.zeros((3, 2), jnp.float32))
+    assert single.dtype == jnp.float32

@@ -234,6 +234,7 @@ def test_settings_out_of_range_are_named(make, options, message):
         "dam-break",
         "standing-wave",
         "piston-wave-maker",
+        "sloshing",
         "oscillating-drop",
         "elliptic-drop",
         "shear-layer",

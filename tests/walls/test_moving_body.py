@@ -21,11 +21,11 @@ from jaxsph import (
 )
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.effects import (
-    BodyForce,
     Continuity,
     DensityDiffusion,
     FreeSlip,
     LaminarViscosity,
+    MovingFrame,
     NoSlip,
     ParticleShifting,
     PressureForce,
@@ -65,16 +65,6 @@ class Shaken(eqx.Module):
 
     def __call__(self, time):
         return self.amplitude * (1.0 - jnp.cos(self.frequency * time))
-
-
-class Inertia(BodyForce):
-    """b = -d''(t), in the frame of a vessel that is displaced by d"""
-
-    displacement: Shaken
-
-    def acceleration(self, time, position):
-        second = jax.jacfwd(jax.jacfwd(self.displacement))(time)
-        return jnp.broadcast_to(-second[None, :], position.shape)
 
 
 def scene(walls, slip, force=None, repelling=VESSEL, time_step=5e-3, velocity=(0.0, 0.0)):
@@ -142,7 +132,7 @@ def test_a_shaken_vessel_is_one_at_rest_under_inertia():
     shaken, end, gaps = Shaken(jnp.asarray([0.08, -0.04])), 0.2, []
     for steps in (40, 80):
         dt = end / steps
-        still = run(scene(at_rest(), NoSlip(), Inertia(shaken), time_step=dt), steps)
+        still = run(scene(at_rest(), NoSlip(), MovingFrame(shaken), time_step=dt), steps)
         gone = run(scene(moved(shaken), NoSlip(), repelling=ROOM, time_step=dt), steps)
         way, velocity, _ = MovingBody(VESSEL, shaken).motion(jnp.asarray(end))
         gap = gone.position - way[None, :] - still.position

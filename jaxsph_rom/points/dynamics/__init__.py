@@ -1,5 +1,6 @@
 """Rates of reduced coordinates: tensors, or full rates at a few sampled points."""
 
+from .base import Closable as Closable
 from .base import Dynamics as Dynamics
 from .coefficients import Coefficients as Coefficients
 from .energy_bound import EnergyBound as EnergyBound

@@ -25,8 +25,12 @@ class Dynamics(eqx.Module):
     ) -> Float[Array, " modes"]:
         """da/dt."""
 
+
+class Closable(Dynamics):
+    """Dynamics that a linear closure can be added to."""
+
     @abc.abstractmethod
     def plus(
         self, first: Float[Array, "modes modes"], others: Float[Array, "coefficients modes modes"]
-    ) -> Dynamics:
+    ) -> Closable:
         """The same and (A + sum_k theta_k A_k) a: a closure."""

@@ -14,12 +14,12 @@ from jaxtyping import Array, Float
 from jaxsph.scenes import Scene
 
 from ...basis import Basis
-from .base import Dynamics
+from .base import Closable
 from .opened import Opened
 from .reference_operators import ReferenceOperators
 
 
-class QuadraticSystem(Dynamics):
+class QuadraticSystem(Closable):
     """da/dt = sum_p m_p(theta) (C_p + L_p a) + Q(a, a), the Galerkin system with the coefficients
     theta explicit, m_p their monomials: m_0 = 1, and theta itself, a viscosity say,
 

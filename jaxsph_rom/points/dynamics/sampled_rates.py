@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...basis import Basis
-from .base import Dynamics
+from .base import Closable
 from .eulerian_rates import EulerianRates
 from .sampling import Chosen
 
 
-class SampledRates(Dynamics):
+class SampledRates(Closable):
     """da/dt = B f-bar_P(centre + Phi a, t; theta) + (A + sum_k theta_k A_k) a.
 
     f-bar is evaluated as it stands, on the samples P and the points around these: terms need not be

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+from typing import Any, TypeVar
 
 import h5py
 import jax
@@ -17,6 +18,7 @@ from ..prediction.trained_model import TrainedModel
 from .object_tree import read, write
 from .whole_file import FlowFileError, open_whole
 
+T = TypeVar("T")
 FORMAT, SCHEMA_VERSION = "jaxsph reduced flow", 4
 
 
@@ -31,10 +33,15 @@ def save(path: str | os.PathLike, model: TrainedModel) -> None:
         ValueError: if an effect, a region or a function could not be found again from the file.
         TrajectoryFileError: if the file cannot be written.
     """
+    write_tree(path, (FORMAT, SCHEMA_VERSION), dataclasses.replace(model, source=None))
+
+
+def write_tree(path: str | os.PathLike, kind: tuple[str, int], model: Any) -> None:
+    """Write a model's tree to a file of a kind, its format and schema version."""
     with whole_file(path) as file:
-        file.attrs["format"], file.attrs["schema_version"] = FORMAT, SCHEMA_VERSION
+        file.attrs["format"], file.attrs["schema_version"] = kind
         file.attrs["units"], file.attrs["versions"] = "SI", json.dumps(versions())
-        write(file, "model", dataclasses.replace(model, source=None))
+        write(file, "model", model)
 
 
 def load(path: str | os.PathLike) -> TrainedModel:
@@ -45,6 +52,12 @@ def load(path: str | os.PathLike) -> TrainedModel:
             needs double precision that JAX has not been told to use.
     """
 
+    return read_tree(path, (FORMAT, SCHEMA_VERSION), "`jaxsph-rom train`", TrainedModel)
+
+
+def read_tree(path: str | os.PathLike, kind: tuple[str, int], made_by: str, wanted: type[T]) -> T:
+    """The model in a file of a kind; errors as `load`."""
+
     def assembled(file):
         double = []
         file.visititems(lambda _, part: double.append(part) if _is_double(part) else None)
@@ -54,11 +67,11 @@ def load(path: str | os.PathLike) -> TrainedModel:
                 "in single precision."
             )
         model = read(file, "model")
-        if not isinstance(model, TrainedModel):
+        if not isinstance(model, wanted):
             raise ValueError("model")
         return model
 
-    return open_whole(path, (FORMAT, SCHEMA_VERSION), "`jaxsph-rom train`", assembled)
+    return open_whole(path, kind, made_by, assembled)
 
 
 def _is_double(part) -> bool:

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxsph.integrate import rk4_step
 
-from ..dynamics.base import Dynamics
+from ..dynamics.base import Closable
 
 _REPORTS = 20  # of progress in a training
 
@@ -39,13 +39,13 @@ class FittedClosure(NamedTuple):
         training, validation: loss at each report; validation is None without a held-back run.
     """
 
-    system: Dynamics
+    system: Closable
     training: list[float]
     validation: list[float] | None
 
 
 def rollout(
-    system: Dynamics,
+    system: Closable,
     coordinates: Float[Array, " modes"],
     values: Float[Array, "*coefficients"],
     time_step: float,
@@ -70,7 +70,7 @@ def rollout(
 
 
 def fit_linear_closure(
-    system: Dynamics,
+    system: Closable,
     runs: Sequence[ProjectedRun],
     time_step: float,
     steps_per_snapshot: int,
@@ -193,7 +193,7 @@ def _windows(
     return tuple(jnp.asarray(part, stacked[0].dtype) for part in stacked)
 
 
-def _check(system: Dynamics, runs: Sequence[ProjectedRun], window: int) -> None:
+def _check(system: Closable, runs: Sequence[ProjectedRun], window: int) -> None:
     if not runs:
         raise ValueError("runs: a closure needs at least one run to learn from.")
     for run in runs:

@@ -1,0 +1,205 @@
+"""A cubic system learnt from projected runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float
+
+from jaxsph.integrate import rk4_step
+
+from .cubic_system import CubicSystem, products
+from .inputs import Inputs
+
+_EDGE = 3  # snapshots at both ends that a filter and a difference spoil
+_RIDGES = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the products' mean squares
+_RECOVERY_RIDGE = 1e-6
+_STEPS = 2  # of RK4 from snapshot to snapshot
+_ITERATIONS = 30
+_STAY = 1e-6  # how much weights cost that leave those of the rates
+_DONE = 1e-4  # relative change of the error that ends the iteration
+_DAMPING = (1e-3, 0.2, 8.0)  # at first, after a good step, after a bad one
+
+
+class LabelRun(NamedTuple):
+    """A full run in reduced coordinates.
+
+    Args:
+        values: theta.
+        start: coordinates of its scene's start (M,).
+        coordinates: of its snapshots, without sound (S, M).
+        others: what is to be recovered beside them (S, R).
+    """
+
+    values: Float[np.ndarray, " coefficients"]
+    start: Float[np.ndarray, " modes"]
+    coordinates: Float[np.ndarray, "snapshots modes"]
+    others: Float[np.ndarray, "snapshots recovered"]
+
+
+class Learnt(NamedTuple):
+    """A system, and how it was learnt.
+
+    Args:
+        system: of the coordinates.
+        rate_error: relative root mean square of what the rates' fit leaves, each coordinate (M,).
+        before, after: relative root mean square error of the roll-outs of all runs, before and
+            after they were fitted.
+    """
+
+    system: CubicSystem
+    rate_error: list[float]
+    before: float
+    after: float
+
+
+def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
+    """W and D of a `CubicSystem`.
+
+    First the rates of the projected runs are fitted, da/dt by central differences of sixth order:
+
+        W_0 = argmin sum |W m(a, p) - da/dt|^2 + ridge |W|^2,
+
+    each product in its own size; then the runs themselves, by Gauss-Newton steps (Levenberg,
+    Marquardt) from W_0,
+
+        W = argmin sum_runs int |a_W(t) - a(t)|^2 dt / int |a|^2 dt,
+
+    a_W from the scene's start by RK4: a wave's phase is what ten periods ask for, and an error of
+    the rates that is small adds up. D is fitted as W_0 is.
+
+    Args:
+        runs: all with the same times.
+        inputs: of the scenes.
+        interval: from snapshot to snapshot [s].
+
+    Raises:
+        ValueError: for fewer than eleven snapshots, or if no ridge gives a system that stays
+            bounded on the runs.
+    """
+    count = len(runs[0].coordinates)
+    if count < 2 * _EDGE + 5:
+        raise ValueError(f"runs: {count} snapshots; rates need {2 * _EDGE + 5}. Record more often.")
+    times = interval * np.arange(count)
+    inner = slice(_EDGE, count - _EDGE)
+    features = [np.asarray(_features(inputs, r.coordinates, times, r.values)) for r in runs]
+    known = np.concatenate([f[inner] for f in features])
+    rates = np.concatenate([_rates(r.coordinates, interval) for r in runs])
+    others = np.concatenate([r.others[inner] for r in runs])
+    size = np.sqrt((known**2).mean(axis=0))
+    size = np.where(size > 0.0, size, 1.0)
+    recovery = _fitted(known / size, others, _RECOVERY_RIDGE) / size
+    roll_outs = _RollOuts.of(runs, inputs, size, interval, recovery)
+    for ridge in _RIDGES:
+        first = _fitted(known / size, rates, ridge)
+        before = float(jnp.linalg.norm(roll_outs.residual(first)))
+        if np.isfinite(before):
+            break
+    else:
+        raise ValueError(
+            f"modes: no system of {first.shape[0]} of them stays bounded on the training runs; "
+            "take fewer modes, or more runs."
+        )
+    weights, after = roll_outs.refined(jnp.asarray(first, runs[0].coordinates.dtype))
+    left = known @ (first / size).T - rates
+    error = np.sqrt((left**2).mean(axis=0) / (rates**2).mean(axis=0))
+    return Learnt(roll_outs.system(weights), [float(e) for e in error], before, after)
+
+
+@eqx.filter_jit
+def _features(inputs, coordinates, times, values):
+    each = jax.vmap(lambda t, a: products(a, inputs(t, values)))
+    return each(jnp.asarray(times, coordinates.dtype), jnp.asarray(coordinates))
+
+
+def _rates(coordinates: np.ndarray, interval: float) -> np.ndarray:
+    """Central differences of sixth order, without the ends."""
+    a, edge, count = coordinates, _EDGE, len(coordinates)
+
+    def away(k):
+        return a[edge + k : count - edge + k] - a[edge - k : count - edge - k]
+
+    return (45.0 * away(1) - 9.0 * away(2) + away(3)) / (60.0 * interval)
+
+
+def _fitted(features: np.ndarray, wanted: np.ndarray, ridge: float) -> np.ndarray:
+    squares = features.T @ features / len(features) + ridge * np.eye(features.shape[1])
+    return np.linalg.solve(squares, features.T @ wanted / len(features)).T
+
+
+class _RollOuts(eqx.Module):
+    """Runs of a system from the starts of all full runs, beside these."""
+
+    inputs: Inputs
+    size: Float[Array, " products"]
+    recovery: Float[Array, "recovered products"]
+    starts: Float[Array, "runs modes"]
+    values: Float[Array, "runs coefficients"]
+    wanted: Float[Array, "runs snapshots modes"]
+    interval: Float[Array, ""]
+
+    @classmethod
+    def of(cls, runs: Sequence[LabelRun], inputs, size, interval, recovery):
+        dtype = runs[0].coordinates.dtype
+        stacked = (np.stack([getattr(r, n) for r in runs]) for n in ("start", "values"))
+        wanted = np.stack([r.coordinates for r in runs])
+        arrays = (size, recovery, *stacked, wanted, interval)
+        return cls(inputs, *(jnp.asarray(a, dtype) for a in arrays))
+
+    def system(self, weights: Float[Array, "modes products"]) -> CubicSystem:
+        return CubicSystem(weights / self.size[None, :], self.recovery, self.inputs)
+
+    @eqx.filter_jit
+    def residual(self, weights) -> Float[Array, " numbers"]:
+        system, step = self.system(jnp.asarray(weights, self.size.dtype)), self.interval / _STEPS
+
+        def run(start, values):
+            def one(a, k):
+                time = step * k.astype(step.dtype)
+                return rk4_step(lambda t, a: system.rates(t, a, values), time, a, step), None
+
+            def interval(a, first):
+                a, _ = lax.scan(one, a, first + jnp.arange(_STEPS))
+                return a, a
+
+            firsts = _STEPS * jnp.arange(self.wanted.shape[1] - 1)
+            return lax.scan(interval, start, firsts)[1]
+
+        off = jax.vmap(run)(self.starts, self.values) - self.wanted[:, 1:]
+        squares = jnp.sum(self.wanted[:, 1:] ** 2, axis=(1, 2), keepdims=True)
+        return (off / jnp.sqrt(squares * len(self.wanted))).reshape(-1)
+
+    @eqx.filter_jit
+    def _jacobian(self, weights):
+        return jax.jacfwd(lambda w: self.residual(w.reshape(weights.shape)))(weights.reshape(-1))
+
+    def refined(self, first: Float[Array, "modes products"]) -> tuple[Array, float]:
+        """Weights after Gauss-Newton steps from the first, and the error then."""
+
+        def cost(off, weights):
+            return float(off @ off + _STAY * jnp.sum((weights - first) ** 2))
+
+        weights, off = first, self.residual(first)
+        least, (damping, better, worse) = cost(off, weights), _DAMPING
+        slope = self._jacobian(weights)
+        for _ in range(_ITERATIONS):
+            squares = slope.T @ slope + _STAY * jnp.eye(slope.shape[1], dtype=slope.dtype)
+            down = slope.T @ off + _STAY * (weights - first).reshape(-1)
+            change = jnp.linalg.solve(squares + damping * jnp.diag(jnp.diag(squares)), down)
+            tried = weights - change.reshape(weights.shape)
+            found = self.residual(tried)
+            reached = cost(found, tried)
+            if not reached < least:  # nor a NaN
+                damping *= worse
+                continue
+            gained, weights, off, least = 1.0 - reached / least, tried, found, reached
+            if gained < _DONE:
+                break
+            damping, slope = damping * better, self._jacobian(weights)
+        return weights, float(jnp.linalg.norm(off))
