@@ -455,15 +455,9 @@ def label_galerkin() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
-<<<<<<< HEAD
         schemes, scheme_models, settled_cavity, cavity_of_pysph, still_water, free_flows,
         particle_vortex, particle_cavity, predicted_vortex, predicted_cavity, particle_step,
-        versions, cheapest_settings,
-=======
-        schemes, scheme_models, settled_cavity, still_water, free_flows, particle_vortex,
-        particle_cavity, predicted_vortex, predicted_cavity, particle_step, versions,
-        cheapest_settings, label_models, label_galerkin,
->>>>>>> free
+        versions, cheapest_settings, label_models, label_galerkin,
     )  # fmt: skip
 }
 

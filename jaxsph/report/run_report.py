@@ -8,17 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-<<<<<<< HEAD
 from ..io import read_box, read_forces, read_overview, read_snapshot, read_walls
-from ..plotting import forces_figure, history_figure, snapshot_figure
-from ..plotting.style import png
-from ..walls.parts import WHOLE
-=======
-from ..io import read_box, read_overview, read_snapshot, read_walls
-from ..plotting import depth_figure, history_figure, snapshot_figure
+from ..plotting import depth_figure, forces_figure, history_figure, snapshot_figure
 from ..plotting.style import png
 from ..trajectory import Snapshot
->>>>>>> hour
+from ..walls.parts import WHOLE
 from . import page
 from .film import film
 from .settings import origin_rows, scene_rows

@@ -88,7 +88,9 @@ def test_a_dam_break_is_named_where_its_labels_mix():
     mixed = mixed_from(run, scene.space)
     assert mixed is not None and 0.02 < mixed < 0.2  # it has left its column, and has not ended
     with pytest.raises(ValueError, match=r"labels mix in the run of alpha = 0.02: from 0\.\d+ s"):
-        train(lambda alpha: dam_break(30, alpha=alpha, end_time=0.24), [{"alpha": 0.02}], runs=[run])
+        train(
+            lambda alpha: dam_break(30, alpha=alpha, end_time=0.24), [{"alpha": 0.02}], runs=[run]
+        )
 
 
 @pytest.mark.parametrize(
