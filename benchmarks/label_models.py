@@ -108,7 +108,7 @@ CASES = {
     "sloshing": Case(
         _tank,
         [{"amplitude": a} for a in (0.002, 0.004)],
-        [{"amplitude": a} for a in (0.0025, 0.003, 0.0035, 0.0045)],
+        [{"amplitude": a} for a in (0.003, 0.0045)],
         gauge=0.0,
         period=2.0 * math.pi / (0.8 * natural_frequency()),
         modes=(4, 6),

@@ -43,6 +43,7 @@ class LabelBasis(eqx.Module):
         """
         if not np.isfinite(snapshots).all():
             raise ValueError("snapshots: a value is not finite; the full model's run has failed.")
+        dtype, snapshots = snapshots.dtype, np.asarray(snapshots, float)
         centre = snapshots.mean(axis=0)
         away = snapshots - centre
         size = np.sqrt((away.reshape(len(away), fields, -1) ** 2).sum(axis=2).mean(axis=0))
@@ -57,7 +58,7 @@ class LabelBasis(eqx.Module):
         rank = int(np.count_nonzero(sigma > noise))
         count = min(modes, rank)
         phi = away.T @ (vectors[:, ::-1][:, :count] / sigma[:count])
-        return cls(phi, centre, scale, sigma)
+        return cls(*(a.astype(dtype) for a in (phi, centre, scale, sigma)))
 
     @property
     def size(self) -> int:

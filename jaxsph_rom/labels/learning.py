@@ -88,10 +88,10 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
         raise ValueError(f"runs: {count} snapshots; rates need {2 * _EDGE + 5}. Record more often.")
     times = interval * np.arange(count)
     inner = slice(_EDGE, count - _EDGE)
-    features = [np.asarray(_features(inputs, r.coordinates, times, r.values)) for r in runs]
-    known = np.concatenate([f[inner] for f in features])
-    rates = np.concatenate([_rates(r.coordinates, interval) for r in runs])
-    others = np.concatenate([r.others[inner] for r in runs])
+    features = (_features(inputs, r.coordinates, times, r.values) for r in runs)
+    known = np.concatenate([np.asarray(f, float)[inner] for f in features])
+    rates = np.concatenate([_rates(np.asarray(r.coordinates, float), interval) for r in runs])
+    others = np.concatenate([np.asarray(r.others[inner], float) for r in runs])
     size = np.sqrt((known**2).mean(axis=0))
     size = np.where(size > 0.0, size, 1.0)
     recovery = _fitted(known / size, others, _RECOVERY_RIDGE) / size
@@ -114,8 +114,9 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
 
 @eqx.filter_jit
 def _features(inputs, coordinates, times, values):
+    times, values = (jnp.asarray(a, coordinates.dtype) for a in (times, values))
     each = jax.vmap(lambda t, a: products(a, inputs(t, values)))
-    return each(jnp.asarray(times, coordinates.dtype), jnp.asarray(coordinates))
+    return each(times, jnp.asarray(coordinates))
 
 
 def _rates(coordinates: np.ndarray, interval: float) -> np.ndarray:

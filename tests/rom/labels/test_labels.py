@@ -71,6 +71,8 @@ def test_a_whole_basis_gives_snapshots_back_and_fields_count_alike():
     parts = ((snapshots - basis.centre) * basis.scale).reshape(9, 2, 30)
     np.testing.assert_allclose((parts**2).sum(axis=2).mean(axis=0), 1.0)
     assert LabelBasis.of(snapshots, 2, 3).size == 3
+    single = LabelBasis.of(snapshots.astype(np.float32), 2, 20)
+    assert single.modes.dtype == np.float32 and single.size == 8
 
 
 @pytest.mark.parametrize(

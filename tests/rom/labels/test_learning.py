@@ -17,8 +17,8 @@ from jaxsph_rom.labels.learning import LabelRun, learn
 INTERVAL, COUNT = 0.1, 401
 
 
-def viscosities(*reynolds):
-    scenes = [standing_wave(16, number, end_time=4.0) for number in reynolds]
+def viscosities(*reynolds, dtype=None):
+    scenes = [standing_wave(16, number, end_time=4.0, dtype=dtype) for number in reynolds]
     functionals = [scene.functional() for scene in scenes]
     place = scenes[0].state.position[0]
     return Inputs.between(functionals, place, 4.0)
@@ -101,6 +101,17 @@ def test_fitting_the_runs_mends_what_noisy_rates_spoil(inputs):
     rolled, wanted = (rollout(learnt.system, oscillator(0.9, 0.0014)),
                       oscillator(0.9, 0.0014).coordinates)  # fmt: skip
     assert np.abs(rolled - wanted).max() < 0.02 * np.abs(wanted).max()
+
+
+def test_single_precision_is_kept():
+    inputs = viscosities(500.0, 1000.0, dtype=jnp.float32)
+    runs = [
+        LabelRun(*(np.asarray(a, np.float32) for a in oscillator(a, v)))
+        for a in (0.6, 1.2) for v in (0.001, 0.002)
+    ]  # fmt: skip
+    learnt = learn(runs, inputs, INTERVAL)
+    assert {a.dtype for a in (learnt.system.weights, learnt.system.recovery)} == {jnp.dtype(jnp.float32)}
+    assert learnt.after < 1e-3
 
 
 def test_too_few_snapshots_are_named(inputs):
