@@ -1,0 +1,194 @@
+"""Tables of reduced models: in both schemes, on particles, on labels, by what they cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from .table_text import ROOT, Row, duration, markdown, results, short
+
+
+def scheme_models() -> str:
+    """Reduced models on points of both schemes, the worse of the unseen runs."""
+    rows = results("scheme_models")
+    names = ("velocity_median", "floor_velocity_median", "pressure_median",
+             "floor_pressure_median", "sound")  # fmt: skip
+
+    def lines() -> Iterator[tuple[str, ...]]:
+        for key in dict.fromkeys((r["scene"], r["modes"], r["closure"]) for r in rows):
+            for scheme in ("delta-plus", "consistent"):
+                case = (*key, scheme)
+                found = [
+                    r for r in rows if (r["scene"], r["modes"], r["closure"], r["scheme"]) == case
+                ]
+                worst = (max(r[f"{name}_percent"] for r in found) for name in names)
+                yield (key[0], str(key[1]), key[2], scheme, *map(short, worst))
+
+    header = ("flow", "M", "closure", "scheme", "velocity %", "floor", "pressure %", "floor",
+              "full model's sound %")  # fmt: skip
+    return markdown(header, lines())
+
+
+def _particles(scene: str, size: int, timed: bool) -> str:
+    """Models on moving particles at several numbers of modes."""
+    header = ("scheme", "M", "projection", "velocity", "pressure", "of the projection",
+              "level (peak)", *(("steps of the full model",) if timed else ()))  # fmt: skip
+    rows = [
+        (
+            row["scheme"],
+            str(row["modes"]),
+            row["projection"],
+            *(
+                f"{short(row[f'{name}_peak_percent'])} / {short(row[f'{name}_median_percent'])}"
+                for name in ("velocity", "pressure", "floor_pressure")
+            ),
+            short(row["level_peak_percent"]),
+            *((short(row["seconds_per_step"] / row["full_seconds_per_step"]),) if timed else ()),
+        )
+        for row in sorted(
+            results(f"particle_modes_{scene}_{size}"),
+            key=lambda row: (row["scheme"], row["projection"] != "galerkin", row["modes"]),
+        )
+    ]
+    return markdown(header, rows)
+
+
+def particle_vortex() -> str:
+    """Of the vortex, most rows made on a machine too busy for times."""
+    return _particles("taylor_green", 32, timed=False)
+
+
+def particle_cavity() -> str:
+    """Of the cavity."""
+    return _particles("lid_driven_cavity", 24, timed=True)
+
+
+def _predicted(scene: str) -> str:
+    """Models on 50 x 50 moving particles at unseen Reynolds numbers, and what they are beside."""
+    header = ("start", "Re", "M", "projection", "velocity", "pressure", "of the projection",
+              "low-passed", "full model's sound", "level (peak)", "named")  # fmt: skip
+    names = ("velocity", "pressure", "floor_pressure", "slow_pressure", "sound")
+    rows = [
+        (
+            row["arrangement"],
+            f"{row['reynolds']:g}",
+            str(row["modes"]),
+            row["projection"],
+            *(f"{short(row[f'{n}_peak_percent'])} / {short(row[f'{n}_median_percent'])}"
+              for n in names),
+            short(row["level_peak_percent"]),
+            row["fault"] or row["doubt"] or row["judged"] or "no",
+        )
+        for row in sorted(
+            results(f"particle_modes_{scene}_50"),
+            key=lambda r: (r["arrangement"], r["projection"] != "galerkin", r["reynolds"],
+                           r["modes"]),
+        )
+    ]  # fmt: skip
+    return markdown(header, rows)
+
+
+def predicted_vortex() -> str:
+    """Of the vortex."""
+    return _predicted("taylor_green")
+
+
+def predicted_cavity() -> str:
+    """Of the cavity."""
+    return _predicted("lid_driven_cavity")
+
+
+def particle_step() -> str:
+    """What a step on moving particles costs, times of the process."""
+    header = ("scene", "particles", "M", "projection", "full [ms]", "reduced [ms]", "ratio")
+    return markdown(
+        header,
+        (
+            (
+                row["scene"],
+                str(row["particles"]),
+                str(row["modes"]),
+                row["projection"],
+                short(1e3 * row["full_process_seconds"]["median"], 3),
+                short(1e3 * row["process_seconds"]["median"], 3),
+                short(row["process_ratio"]),
+            )
+            for row in results("particle_step")
+        ),
+    )
+
+
+def cheapest_settings() -> str:
+    """The cheapest full model in either scheme and the cheapest reduced model within an error, of
+    the Taylor-Green vortex."""
+    path = ROOT / "benchmarks" / "results" / "work_precision_full.json"
+    rows = json.loads(path.read_text(encoding="utf-8"))["scenes"]["taylor-green"]["rows"]
+    kinds = (
+        [r for r in rows if r["settings"].get("scheme") == "delta-plus"],
+        [r for r in rows if r["settings"].get("scheme") == "consistent"],
+        [r for r in rows if r["family"] == "tensor"],
+    )
+
+    def best(kind: list[Row], measure: str, wanted: float) -> str:
+        within = [r for r in kind if r["fault"] is None and r[measure] <= wanted]
+        row = min(within, key=lambda r: r["run_seconds"]["median"], default=None)
+        if row is None:
+            return "none"
+        return f"{row['label']}: {duration(row['run_seconds']['median'])}"
+
+    wanted = [("velocity", "velocity_peak_percent", e) for e in (2.0, 1.0, 0.5, 0.2)]
+    wanted += [("pressure", "pressure_median_percent", e) for e in (10.0, 3.0, 2.0)]
+    head = ("wanted", "delta-plus scheme", "consistent scheme", "tensors of delta-plus runs")
+    return markdown(
+        head,
+        ((f"{name} {e:g} %", *(best(kind, measure, e) for kind in kinds))
+         for name, measure, e in wanted),
+    )  # fmt: skip
+
+
+def label_models() -> str:
+    """Models on labels at the parameters that they have not seen."""
+    header = ("wave", "particles", "modes", "at", "height off by %", "mean %", "floor %",
+              "sound %", "velocity %", "times faster")  # fmt: skip
+    rows = [
+        (
+            row["scene"],
+            str(row["particles"]),
+            str(row["modes"]),
+            ", ".join(f"{name} {value:g}" for name, value in row["parameters"].items())
+            + (" (outside)" if row["outside"] else ""),
+            *(
+                short(row[f"{name}_percent"])
+                for name in ("height_error", "height_error_mean", "height_floor", "sound",
+                             "velocity_median")
+            ),
+            f"{row['times_faster']:.0f}",
+        )
+        for row in results("label_models")
+        if row["model"] == "labels" and not row["seen"]
+    ]  # fmt: skip
+    return markdown(header, rows)
+
+
+def label_galerkin() -> str:
+    """The projected functional beside the learnt model of the same flow."""
+    rows = results("label_models")
+    lines = []
+    for row in rows:
+        if row["model"] != "galerkin":
+            continue
+        same = ("scene", "resolution", "modes", "parameters")
+        learnt = next(
+            r for r in rows if r["model"] == "labels" and all(r[k] == row[k] for k in same)
+        )
+        lines += [
+            (
+                f"{row['scene']}, {learnt['particles']} particles",
+                kind,
+                *(short(value) for value in found["height_error_by_period_percent"][::3]),
+                short(found["reached_periods"]),
+            )
+            for kind, found in (("Galerkin", row), (f"learnt, M = {row['modes']}", learnt))
+        ]
+    header = ("wave", "model", "period 1", "4", "7", "10", "periods reached")
+    return markdown(header, lines)
