@@ -3,7 +3,7 @@
 A line `@include README.md: In Python` is replaced by what stands under that heading, with the
 headings inside one level up; `@include README.md: (start)` by what stands before the first such
 heading, and `@include CHANGELOG.md` by all but the title. Links are made those of the page; what
-is no page, a notebook say, is named where it was linked.
+is no page is named where it was linked.
 """
 
 import posixpath
@@ -56,8 +56,11 @@ def on_page_markdown(markdown, page, config, files):
         return _LINK.sub(linked, found)
 
     def linked(link):
-        if not link["target"].startswith("docs/"):
-            return f"`{link['target']}`"
-        return f"[{link['text']}]({posixpath.relpath(link['target'], here)})"
+        target = link["target"]
+        if target.startswith("notebooks/"):  # each has a page, by hooks/notebooks.py
+            target = f"docs/{target.removesuffix('.ipynb')}.md"
+        if not target.startswith("docs/"):
+            return f"`{target}`"
+        return f"[{link['text']}]({posixpath.relpath(target, here)})"
 
     return _DIRECTIVE.sub(included, markdown)

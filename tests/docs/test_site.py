@@ -109,7 +109,9 @@ def test_every_scene_has_its_page(site):
 
 
 def test_every_notebook_has_its_page(site):
+    index = (site / "notebooks/index.html").read_text()
     for notebook in (ROOT / "notebooks").glob("*.ipynb"):
+        assert f'href="{notebook.stem}.html"' in index
         page = html.unescape((site / f"notebooks/{notebook.stem}.html").read_text())
         shown = [f"notebooks/{name}" for name in re.findall(r'src="([\w]+\.png)"', page)]
         assert len(shown) == notebook.read_text().count('"image/png"') > 0

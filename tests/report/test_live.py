@@ -72,23 +72,6 @@ def test_the_command_serves_until_it_is_interrupted(tmp_path):
     assert running.wait(timeout=30) == 0
 
 
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        (["missing.h5"], "no such file"),
-        (["t.h5", "--port", "70000"], "--port: must be from 0 to 65535"),
-        (["t.h5", "--seconds", "0"], "--seconds: must be positive"),
-        (["t.h5", "--fields", "colour"], "--fields: invalid choice: 'colour'"),
-    ],
-)
-def test_bad_input_is_one_line(tmp_path, monkeypatch, capsys, arguments, message):
-    monkeypatch.chdir(tmp_path)
-    random_run("t.h5", count=2)
-    assert main(["watch", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and message in error
-
-
 def test_a_port_that_is_taken_is_named(tmp_path, capsys):
     random_run(tmp_path / "t.h5", count=2)
     with socket.create_server((HOST, 0)) as taken:
