@@ -110,7 +110,8 @@ def test_single_precision_is_kept():
         for a in (0.6, 1.2) for v in (0.001, 0.002)
     ]  # fmt: skip
     learnt = learn(runs, inputs, INTERVAL)
-    assert {a.dtype for a in (learnt.system.weights, learnt.system.recovery)} == {jnp.dtype(jnp.float32)}
+    system = learnt.system
+    assert {a.dtype for a in (system.weights, system.recovery)} == {jnp.dtype(jnp.float32)}
     assert learnt.after < 1e-3
 
 
