@@ -66,8 +66,8 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
 
         W_0 = argmin sum |W m(a, p) - da/dt|^2 + ridge |W|^2,
 
-    each product in its own size; then the runs themselves, by Gauss-Newton steps (Levenberg,
-    Marquardt) from W_0,
+    each product in its own size, with the ridge that follows the runs best; then the runs
+    themselves, by Gauss-Newton steps (Levenberg, Marquardt) from W_0,
 
         W = argmin sum_runs int |a_W(t) - a(t)|^2 dt / int |a|^2 dt,
 
@@ -96,20 +96,22 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
     size = np.where(size > 0.0, size, 1.0)
     recovery = _fitted(known / size, others, _RECOVERY_RIDGE) / size
     roll_outs = _RollOuts.of(runs, inputs, size, interval, recovery)
-    for ridge in _RIDGES:
-        first = _fitted(known / size, rates, ridge)
-        before = float(jnp.linalg.norm(roll_outs.residual(first)))
-        if np.isfinite(before):
-            break
-    else:
+    tried = [_fitted(known / size, rates, ridge) for ridge in _RIDGES]
+    errors = [float(jnp.linalg.norm(roll_outs.residual(weights))) for weights in tried]
+    before, first = min(zip(errors, tried, strict=True), key=lambda pair: _finite(pair[0]))
+    if not np.isfinite(before):
         raise ValueError(
-            f"modes: no system of {first.shape[0]} of them stays bounded on the training runs; "
-            "take fewer modes, or more runs."
+            f"modes: no system of {len(first)} of them stays bounded on the training runs; take "
+            "fewer modes, or more runs."
         )
     weights, after = roll_outs.refined(jnp.asarray(first, runs[0].coordinates.dtype))
     left = known @ (first / size).T - rates
     error = np.sqrt((left**2).mean(axis=0) / (rates**2).mean(axis=0))
     return Learnt(roll_outs.system(weights), [float(e) for e in error], before, after)
+
+
+def _finite(error: float) -> float:
+    return error if np.isfinite(error) else np.inf
 
 
 @eqx.filter_jit

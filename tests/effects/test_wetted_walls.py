@@ -26,7 +26,11 @@ def test_ghosts_are_wet_below_the_water_line_and_dry_above():
     ghosts = jax.jit(lambda state: functional.passes(jnp.zeros(()), state, neighbors)[2])(
         scene.state
     )
-    height = np.asarray(ghosts["position"][:, 1])
+    position, particles = (np.asarray(a) for a in (ghosts["position"], scene.state.position))
+    apart = np.linalg.norm(position[:, None] - particles[None], axis=2).min(axis=1)
+    seen = apart < 0.9 * scene.space.support  # what others hold is never summed
+    ghosts = {name: field[seen] for name, field in ghosts.items()}
+    height = position[seen, 1]
     volume = np.asarray(ghosts["volume"]) / scene.space.spacing**2
     line, dx = 0.15, scene.space.spacing
     assert (np.asarray(ghosts["pressure"]) >= 0.0).all()

@@ -8,7 +8,8 @@ import pytest
 
 from jaxsph import run_scene
 from jaxsph.metrics import surface_height
-from jaxsph.scenes import dam_break, standing_wave
+from jaxsph.scenes import dam_break, sloshing, standing_wave
+from jaxsph.scenes.sloshing import natural_frequency
 from jaxsph_rom.labels import load, mixed_from, train
 from jaxsph_rom.points import FlowFileError
 
@@ -81,6 +82,30 @@ def test_a_file_holds_all_of_it(trained, tmp_path):
 def test_parameters_that_are_none_are_named(trained, parameters, message):
     with pytest.raises(ValueError, match=message):
         trained.predict(parameters)
+
+
+def shaken(amplitude):
+    """Five particles deep, ten periods of shaking, 30 snapshots each."""
+    period = 2.0 * np.pi / (0.8 * natural_frequency())
+    step = period / 240
+    scene = sloshing(20, amplitude=amplitude, time_step=step, end_time=10.0 * period)
+    return dataclasses.replace(scene, steps_per_snapshot=8)
+
+
+@pytest.mark.slow  # half a minute
+def test_a_shaken_tank_of_an_unseen_amplitude():
+    """The tank's acceleration is an input, in time and in its amplitude; ten periods."""
+    ends, unseen = (0.002, 0.004), 0.003
+    full = [run_scene(shaken(a), measure=None) for a in (*ends, unseen)]
+    trained = train(shaken, [{"amplitude": a} for a in ends], 3, runs=full[:-1])
+    assert trained.system.inputs.axes == (0,)
+    found = trained.predict({"amplitude": unseen}).fields()
+    seen, wanted = (surface_height(run, shaken(unseen), 0.0) for run in (found, full[-1]))
+    off = np.abs(seen - wanted) / np.abs(wanted - wanted.mean()).max()
+    # a wave of a third of a spacing, five particles deep: the projection of the full run on all
+    # modes is itself off by 12.3 percent at most and 2.5 on the average
+    assert off.max() < 0.15  # 13.0 percent measured
+    assert off.mean() < 0.04  # 3.3 percent
 
 
 def test_a_dam_break_is_named_where_its_labels_mix():
