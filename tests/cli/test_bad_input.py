@@ -154,11 +154,6 @@ FULL = {
     "export t.h5 --fields colour": "--fields: invalid choice: 'colour'",
     "export t.h5 --every -1": "--every: must be at least 1",
     "export t.h5 --out t.h5": "is the trajectory itself",
-    "watch": "FILE",
-    "watch missing.h5": "no such file",
-    "watch text": "text",
-    "watch t.h5 --port 70000": "--port: must be from 0 to 65535",
-    "watch t.h5 --fields colour": "--fields: invalid choice",
     "animate text": "text",
     "animate t.h5 --fps x": "--fps: invalid",
     "animate t.h5 --out t.avi": "end with .gif or .mp4",
@@ -230,10 +225,6 @@ REDUCED = {
     "advise taylor-green --time-budget 3fortnights": "--time-budget",
     "advise taylor-green --time-budget 3s --table text": "no table of measurements",
     "advise taylor-green --velocity-error 1% --json folder": "is a folder",
-    # show
-    "show": "FILE",
-    "show missing.h5": "no such file",
-    "show model.h5 --figure f.png": "is no run",
 }
 ALL = [(p, *case) for p, of in (("jaxsph", FULL), ("jaxsph-rom", REDUCED)) for case in of.items()]
 
