@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from jaxsph import Timing, Trajectory
-from jaxsph.io import TrajectoryFileError, read_checkpoint, read_overview, read_trajectory
+from jaxsph.io import TrajectoryFileError, read_box, read_checkpoint, read_overview, read_trajectory
 from jaxsph.plotting import FIELDS, animate
 from tests.runs import random_run
 
@@ -78,7 +78,7 @@ def test_plot_shows_the_snapshot_asked_for(tmp_path):
 
 def test_animation_is_that_of_the_file(tmp_path):
     source = random_run(tmp_path / "t.h5", finish=True)
-    ours = read_trajectory(source).animate(tmp_path / "ours.gif", every=2)
+    ours = read_trajectory(source).animate(tmp_path / "ours.gif", every=2, box=read_box(source))
     theirs = animate(source, tmp_path / "theirs.gif", every=2)
     assert ours.read_bytes() == theirs.read_bytes()
     with Image.open(ours) as picture:
