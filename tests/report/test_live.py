@@ -60,7 +60,10 @@ def test_it_follows_a_run(tmp_path):
 
 def test_the_command_serves_until_it_is_interrupted(tmp_path):
     random_run(tmp_path / "t.h5", count=2)
-    words = [sys.executable, "-m", "jaxsph", "watch", "t.h5", "--fields", "vorticity"]
+    # tests that were started in the background pass on that interrupts are ignored
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    run = f"{heard}; import sys; from jaxsph.cli import main; sys.exit(main())"
+    words = [sys.executable, "-c", run, "watch", "t.h5", "--fields", "vorticity"]
     running = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, text=True,
                                env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
     try:
