@@ -158,10 +158,13 @@ def label_models() -> str:
             ", ".join(f"{name} {value:g}" for name, value in row["parameters"].items())
             + (" (outside)" if row["outside"] else ""),
             *(
-                short(row[f"{name}_percent"])
-                for name in ("height_error", "height_error_mean", "height_floor", "sound",
-                             "velocity_median")
+                (f"lost after {row['reached_periods']:.1f} periods", "")
+                if row["fault"]
+                else (short(row["height_error_percent"]), short(row["height_error_mean_percent"]))
             ),
+            short(row["height_floor_percent"]),
+            short(row["sound_percent"]),
+            "" if row["fault"] else short(row["velocity_median_percent"]),
             f"{row['times_faster']:.0f}",
         )
         for row in results("label_models")
