@@ -165,7 +165,7 @@ def label_models() -> str:
             short(row["height_floor_percent"]),
             short(row["sound_percent"]),
             "" if row["fault"] else short(row["velocity_median_percent"]),
-            f"{row['times_faster']:.0f}",
+            "" if row["fault"] else f"{row['times_faster']:.0f}",
         )
         for row in results("label_models")
         if row["model"] == "labels" and not row["seen"]

@@ -19,8 +19,8 @@ _MAPPINGS = Path("/proc/self/maps")  # where there is such a thing
 _MOST = 25_000  # a process may have 65,530 on Linux
 
 
-# Tests compile much and run little: XLA's former code generator makes a program in three quarters
-# of the time, which then runs a tenth slower.
+# Tests compile much and run little: XLA's former code generator makes a program sooner, which then
+# runs slower, and adds up in order where COMPILER_OPTIONS would not. So users are without it.
 _GENERATOR = "--xla_cpu_use_fusion_emitters=false"
 
 
