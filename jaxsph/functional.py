@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .compiled import full_precision
 from .effects import BodyForce, Context, Effect
 from .fluid import Fluid
 from .neighbors import VerletList, WallList
@@ -78,6 +79,7 @@ class SPHFunctional(eqx.Module):
         """
         return self.rates(*self.sums(time, state, neighbors), neighbors)
 
+    @full_precision
     def rates(
         self,
         context: Context,
@@ -117,6 +119,7 @@ class SPHFunctional(eqx.Module):
         context, fields, _, _, sums = self.passes(time, state, neighbors)
         return context, fields, sums
 
+    @full_precision
     def passes(
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> tuple[Context, dict[str, Array], dict[str, Array], tuple[PairTerm, ...], dict[str, Array]]:

@@ -10,7 +10,9 @@ each. The primitive carries its own rules:
 - forward mode: the tangent of a pair sum is a pair sum of g's own `jax.jvp`;
 - reverse mode: a neighbour list is symmetric, so the transpose is again a pair sum, with the roles
   of the two particles exchanged (gathers only, no scatter);
-- batching: members are mapped over one by one, so that the working set stays in cache.
+- batching: a CPU takes members one by one, so that the working set stays in cache, a GPU all at
+  once;
+- a GPU has a kernel of its own (`pair_sum_on_gpu.py`).
 """
 
 from __future__ import annotations
@@ -29,11 +31,13 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
+from . import pair_sum_on_gpu
 from .at_ghosts import AtGhost
 from .chunks import overlapping_map
 from .domain import Box
 from .kernels import Kernel
 from .neighbors import VerletList, WallPairs
+from .pair_derivatives import Linearised, Transposed, replaced
 from .vector import Vector
 
 _SLOTS_PER_CHUNK = 120_000  # rows times neighbour slots worked on at a time (measured)
@@ -202,7 +206,9 @@ def pair_sum(
     for name, width in layout:
         columns += [fields[name][:, k] for k in range(width)] if width else [fields[name]]
     function = _Composed(terms, space, layout)
-    outputs = pair_sum_p.bind(neighbors.index, *columns, function=function, rows=rows)
+    outputs = pair_sum_p.bind(
+        neighbors.index, *columns, function=function, rows=rows, mapped=()
+    )
     sums, start = {}, 0
     for term, width in zip(terms, function.widths(columns[0].dtype), strict=True):
         if width:
@@ -254,57 +260,6 @@ class _Composed:
         return tuple(found)
 
 
-# ------------------------------------------------------------------ derivatives of pair functions
-
-
-@dataclass(frozen=True)
-class _Linearised:
-    """Columns T and tangents of the `active` ones -> tangent of `function`."""
-
-    function: Callable
-    active: tuple[int, ...]
-    count: int  # columns of `function`
-
-    def __call__(self, here, there):
-        def at(here_active, there_active):
-            return self.function(
-                _replace(here[: self.count], self.active, here_active),
-                _replace(there[: self.count], self.active, there_active),
-            )
-
-        primals = tuple([side[k] for k in self.active] for side in (here, there))
-        tangents = tuple(list(side[self.count :]) for side in (here, there))
-        return jax.jvp(at, primals, tangents)[1]
-
-
-@dataclass(frozen=True)
-class _Transposed:
-    """Columns T and cotangents of `function`'s sums -> cotangents of the `active` columns.
-
-    T_i enters the sum of i as the first particle and the sums of its neighbours as the second.
-    """
-
-    function: Callable
-    active: tuple[int, ...]
-    count: int
-
-    def __call__(self, here, there):
-        mine, other = list(here[: self.count]), list(there[: self.count])
-        active = [mine[k] for k in self.active]
-        _, pull = jax.vjp(lambda a: self.function(_replace(mine, self.active, a), other), active)
-        (as_first,) = pull(tuple(here[self.count :]))
-        _, pull = jax.vjp(lambda a: self.function(other, _replace(mine, self.active, a)), active)
-        (as_second,) = pull(tuple(there[self.count :]))
-        return tuple(a + b for a, b in zip(as_first, as_second, strict=True))
-
-
-def _replace(columns, places, values):
-    columns = list(columns)
-    for k, value in zip(places, values, strict=True):
-        columns[k] = value
-    return columns
-
-
 # ------------------------------------------------------------------ the primitive
 
 pair_sum_p = Primitive("pair_sum")
@@ -347,59 +302,85 @@ def _evaluate(index, *columns, function, rows):
     return list(overlapping_map(sums_of_some, (here, index[wanted], own), chunk))
 
 
-def _abstract(index, *columns, function, rows):
+def _one_by_one(index, *columns, function, rows, mapped):
+    """Of each member; `mapped` are the places of the arguments that have a leading axis of them."""
+    arguments = index, *columns
+
+    def member(own):
+        return tuple(_evaluate(*replaced(arguments, mapped, own), function=function, rows=rows))
+
+    return list(lax.map(member, [arguments[k] for k in mapped]) if mapped else member([]))
+
+
+def _abstract(index, *columns, function, rows, mapped):
     probe = [jax.ShapeDtypeStruct((1, 1), c.dtype) for c in columns]
     outputs = jax.eval_shape(lambda *c: function(c, c), *probe)
-    count = columns[0].shape[0] if rows is None else rows[1] - rows[0]
-    return [jax.core.ShapedArray((count,), o.dtype) for o in outputs]
+    count = index.shape[-2] if rows is None else rows[1] - rows[0]
+    members = [(index, *columns)[k].shape[0] for k in mapped[:1]]
+    return [jax.core.ShapedArray((*members, count), o.dtype) for o in outputs]
 
 
-def _jvp(primals, tangents, *, function, rows):
-    index, *columns = primals
+def _jvp(primals, tangents, *, function, rows, mapped):
+    _, *columns = primals
     active = tuple(k for k, t in enumerate(tangents[1:]) if type(t) is not ad.Zero)
-    outputs = pair_sum_p.bind(*primals, function=function, rows=rows)
+    outputs = pair_sum_p.bind(*primals, function=function, rows=rows, mapped=mapped)
     if not active:
         return outputs, [ad.Zero.from_primal_value(o) for o in outputs]
-    linear = _Linearised(function, active, len(columns))
+    linear = Linearised(function, active, len(columns))
     moved = [tangents[1 + k] for k in active]
-    return outputs, pair_sum_p.bind(index, *columns, *moved, function=linear, rows=rows)
+    mapped += tuple(k for k, a in enumerate(active, len(primals)) if 1 + a in mapped)
+    return outputs, pair_sum_p.bind(*primals, *moved, function=linear, rows=rows, mapped=mapped)
 
 
-def _transpose(cotangents, index, *columns, function, rows):
+def _transpose(cotangents, index, *columns, function, rows, mapped):
     primals = columns[: function.count]
     linear = columns[function.count :]
     if any(map(ad.is_undefined_primal, primals)) or not all(map(ad.is_undefined_primal, linear)):
         raise NotImplementedError("a pair sum is linear in its tangent columns only")
-    if isinstance(function, _Linearised):
-        flipped = _Transposed(function.function, function.active, function.count)
+    if isinstance(function, Linearised):
+        flipped = Transposed(function.function, function.active, function.count)
     else:
-        flipped = _Linearised(function.function, function.active, function.count)
+        flipped = Linearised(function.function, function.active, function.count)
     cotangents = [ad.instantiate_zeros(c) for c in cotangents]
     if rows is not None:  # a sum that was not wanted has no cotangent
-        beyond = (rows[0], index.shape[0] - rows[1])
-        cotangents = [jnp.pad(c, beyond) for c in cotangents]
-    outputs = pair_sum_p.bind(index, *primals, *cotangents, function=flipped, rows=None)
-    return [None] * (1 + len(primals)) + list(outputs)
+        beyond = (rows[0], index.shape[-2] - rows[1])
+        along = [(0, 0)] * (cotangents[0].ndim - 1) + [beyond]
+        cotangents = [jnp.pad(c, along) for c in cotangents]
+    start = 1 + function.count
+    own = tuple(k for k in mapped if k < start)
+    every = tuple(range(start, start + len(cotangents))) if mapped else ()
+    outputs = pair_sum_p.bind(
+        index, *primals, *cotangents, function=flipped, rows=None, mapped=own + every
+    )
+    outputs = [  # what members share has a share of each
+        jnp.sum(o, axis=0) if mapped and k not in mapped else o
+        for k, o in enumerate(outputs, start)
+    ]
+    return [None] * start + outputs
 
 
-def _batch(arguments, axes, *, function, rows):
+def _batch(arguments, axes, *, function, rows, mapped):
     moved = [
         a if axis is None else jnp.moveaxis(a, axis, 0)
         for a, axis in zip(arguments, axes, strict=True)
     ]
-    mapped = [k for k, axis in enumerate(axes) if axis is not None]
+    new = tuple(k for k, axis in enumerate(axes) if axis is not None)
+    if not mapped:
+        outputs = pair_sum_p.bind(*moved, function=function, rows=rows, mapped=new)
+        return outputs, [0] * len(outputs)
 
     def member(own):
-        arguments = _replace(moved, mapped, own)
-        return tuple(pair_sum_p.bind(*arguments, function=function, rows=rows))
+        arguments = replaced(moved, new, own)
+        return tuple(pair_sum_p.bind(*arguments, function=function, rows=rows, mapped=mapped))
 
-    outputs = lax.map(member, [moved[k] for k in mapped])
+    outputs = lax.map(member, [moved[k] for k in new])
     return list(outputs), [0] * len(outputs)
 
 
-pair_sum_p.def_impl(jax.jit(_evaluate, static_argnames=("function", "rows")))
+pair_sum_p.def_impl(jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped")))
 pair_sum_p.def_abstract_eval(_abstract)
-mlir.register_lowering(pair_sum_p, mlir.lower_fun(_evaluate, multiple_results=True))
+mlir.register_lowering(pair_sum_p, mlir.lower_fun(_one_by_one, multiple_results=True))
+mlir.register_lowering(pair_sum_p, pair_sum_on_gpu.lower, platform="cuda")
 ad.primitive_jvps[pair_sum_p] = _jvp
 ad.primitive_transposes[pair_sum_p] = _transpose
 batching.primitive_batchers[pair_sum_p] = _batch

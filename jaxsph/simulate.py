@@ -6,7 +6,6 @@ import dataclasses
 import time as clock
 import warnings
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Protocol
 
 import equinox as eqx
@@ -14,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .compiler_options import COMPILER_OPTIONS
+from .compiled import compiled
 from .forces_over_time import ForcesOverTime
 from .integrate import (
     Fault,
@@ -44,7 +43,7 @@ Watch = Callable[[float, Snapshot], str | None]
 Measure = Callable[[Any, jax.Array, Any], tuple[dict[str, jax.Array], dict[str, jax.Array]]]
 
 
-@partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
+@compiled
 def _interval(model, state, first_step, time_step, steps, stepping, averaged):
     if averaged is not None:
         model = ForcesOverTime(model, averaged)

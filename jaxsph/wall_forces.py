@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float
 from scipy.spatial import cKDTree
 
 from .at_ghosts import Otherwise
-from .compiler_options import COMPILER_OPTIONS
+from .compiled import compiled, full_precision
 from .effects.local_no_slip import NearWeight
 from .full_model import FullModel
 from .functional import SPHFunctional
@@ -141,6 +141,7 @@ def loads(
     return _guarded(forces, model, time, state)[0]
 
 
+@full_precision
 def loads_of(
     forces: WallForces, functional: SPHFunctional, passed: tuple, neighbors: WallList
 ) -> Loads:
@@ -177,7 +178,7 @@ def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, 
     return loads_of(forces, model.functional, passed, neighbors), neighbors.overflow
 
 
-_measured = eqx.filter_jit(_guarded, compiler_options=COMPILER_OPTIONS)
+_measured = compiled(_guarded)
 
 
 def _whole(forces: WallForces, model: FullModel, time, state) -> Loads:

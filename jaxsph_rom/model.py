@@ -11,6 +11,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional, WalledSearch
+from jaxsph.compiled import full_precision
 from jaxsph.effects import Effect
 from jaxsph.full_model import (
     DENSITY_BOUNDS,
@@ -145,6 +146,7 @@ class ReducedModel(Model):
         flat = modes.reshape(-1, modes.shape[2])
         return PseudoInverse(flat, jnp.tile(self.basis.weights, modes.shape[0]))
 
+    @full_precision
     def project(self, state: ParticleState) -> ReducedState:
         """The reduced state nearest to a full one, at the same positions."""
         fields = jnp.concatenate([state.density[:, None], state.velocity], axis=1)
@@ -152,6 +154,7 @@ class ReducedModel(Model):
         inverse = self.pseudo_inverse(modes)
         return ReducedState(inverse((fields - centre).reshape(-1)), state.position)
 
+    @full_precision
     def reconstruct(self, state: ReducedState) -> ParticleState:
         """The full state that a reduced one stands for, (rho, u) = centre + Phi~ w^."""
         modes, centre = self.basis_at(state.position)
@@ -165,6 +168,7 @@ class ReducedModel(Model):
         speed = (1.0 + SHIFT_SHARE) * self.functional.fluid.reference_speed
         return refresh_list(self.search, auxiliary, state.position, speed * time_step)
 
+    @full_precision
     def stacked_rates(
         self,
         time,
@@ -190,6 +194,7 @@ class ReducedModel(Model):
         found = self.advection.remaining(seen, particles.density, carried)
         return found.reshape(-1), rates.position
 
+    @full_precision
     def rates(self, time, state, auxiliary):
         modes, centre = self.basis_at(state.position)
         inverse = self.pseudo_inverse(modes)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph.chunks import chunked_map, overlapping_map
+from jaxsph.chunks import chunked_map, overlapping_map, wide_map
 
 
 @pytest.mark.parametrize("rows", [0, 1, 5, 16, 100, 1337, 2000, 2001])
@@ -17,7 +17,7 @@ def test_maps_in_chunks_are_maps_of_all_rows(rows):
         return jnp.sum(one, axis=1), other + 1
 
     whole = function((values, jnp.arange(rows)))
-    for mapped in (chunked_map, overlapping_map):
+    for mapped in (chunked_map, overlapping_map, wide_map):
         for chunk in (1, 7, 8, 300, 5000):
             found = mapped(function, (values, jnp.arange(rows)), chunk)
             jax.tree.map(np.testing.assert_array_equal, found, whole)
@@ -29,3 +29,12 @@ def test_rows_beyond_the_last_have_a_derivative():
 
     values = jnp.arange(1.0, 8.0)  # seven rows in two chunks
     np.testing.assert_allclose(jax.grad(total)(values), 0.5 / np.sqrt(values))
+
+
+def test_a_gpu_takes_all_rows_at_once_where_a_cpu_takes_a_few():
+    mapped = jax.jit(lambda values: wide_map(jnp.sqrt, values, 5)).trace(jnp.arange(1.0, 21.0))
+    taken = {
+        platform: mapped.lower(lowering_platforms=(platform,)).as_text().count("tensor<4x5xf64>")
+        for platform in ("cpu", "cuda")
+    }
+    assert taken["cpu"] > 0 and taken["cuda"] == 0

@@ -388,6 +388,32 @@ def test_vmap_equals_a_loop(shared):
             np.testing.assert_allclose(a, b, atol=1e-13 * float(jnp.max(jnp.abs(b))))
 
 
+def test_what_members_share_has_the_sum_of_their_cotangents():
+    """Reverse mode of a batch, of its shared fields too; and a batch of batches."""
+    case = Case(2, 8, HARDEST[1:2])
+    own = jnp.stack([case.along(0.02 * k)["position"] for k in range(4)])
+    velocity = case.fields["velocity"]
+
+    def one(position, velocity):
+        moved = {**case.moved, "position": position, "velocity": velocity}
+        return case.scalar(moved, case.neighbors)
+
+    def of_all(own, velocity):
+        return jnp.sum(jnp.cos(jax.vmap(one, (0, None))(own, velocity)))
+
+    def in_turn(own, velocity):
+        return sum(jnp.cos(one(position, velocity)) for position in own)
+
+    found, exact = (jax.jit(jax.grad(f, (0, 1)))(own, velocity) for f in (of_all, in_turn))
+    for a, b in zip(found, exact, strict=True):
+        # the same sums in another order
+        np.testing.assert_allclose(a, b, atol=1e-13 * float(jnp.max(jnp.abs(b))))
+    twice = jax.vmap(jax.vmap(one, (0, None)), (None, 0))
+    faster = jnp.stack([velocity, 2.0 * velocity])
+    once = jax.jit(jax.vmap(one, (0, None)))(own, faster[1])
+    np.testing.assert_allclose(jax.jit(twice)(own, faster)[1], once, rtol=1e-13)
+
+
 # ------------------------------------------------------------------ pairs at zero distance
 
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ..compiler_options import COMPILER_OPTIONS
+from ..compiled import compiled
 from ..full_model import refresh_list
 from ..neighbors import NeighborSearch
 from ..pairs import PairTerm, Space, pair_sum
@@ -90,7 +89,7 @@ class Packed(Arrangement):
             position = space.box.wrap(position + _STEP * dx * velocity)
             return position, velocity, neighbors, residual(force), count + 1
 
-        @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
+        @compiled
         def run(position):
             infinite = jnp.asarray(jnp.inf, position.dtype)
             carry = (position, jnp.zeros_like(position), search.build(position), infinite, 0)

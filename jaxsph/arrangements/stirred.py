@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import final
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import lax
 
-from ..compiler_options import COMPILER_OPTIONS
+from ..compiled import compiled
 from ..effects.particle_shifting import shift_velocity, shifting_term
 from ..full_model import refresh_list
 from ..neighbors import NeighborSearch
@@ -94,7 +93,7 @@ def _stirred(arrangement: Stirred, space: Space, dtype):
         position = space.box.wrap(position + time_step * swirl(middle, space))
         return (position, neighbors, overflow | neighbors.overflow), None
 
-    @partial(eqx.filter_jit, compiler_options=COMPILER_OPTIONS)
+    @compiled
     def run(position):
         carry = (position, search.build(position), jnp.zeros((), bool))
         return lax.scan(step, carry, None, length=steps)[0]

@@ -8,12 +8,14 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
+from ..compiled import full_precision
 from .checkpoints import segment_length
 from .faults import Fault, FaultCode
 from .model import Model
 from .stepping import FixedSteps, Stepping
 
 
+@full_precision
 def integrate(
     model: Model,
     state: Any,

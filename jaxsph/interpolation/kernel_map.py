@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..chunks import chunked_map
+from ..compiled import full_precision
 from ..neighbors import CellBins, CellGrid
 from ..pairs import Space
 
@@ -60,6 +61,7 @@ class KernelMap(eqx.Module):
     ) -> Float[Array, "points fields"]:
         """Fields at points from their sums, for a row of padding anything."""
 
+    @full_precision
     def __call__(
         self, position: Float[Array, "particles dim"], values: Float[Array, "particles fields"]
     ) -> tuple[Float[Array, "points fields"], Bool[Array, ""]]:

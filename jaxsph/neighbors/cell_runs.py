@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, Int, UInt32
 
-from ..chunks import chunked_map
+from ..chunks import wide_map
 from .cell_grid import CellGrid, stencil
 
 BITS = 32  # of a word in which candidates are flagged
@@ -127,7 +127,7 @@ def flags(
     places = jnp.arange(here.count, dtype=jnp.int32)
     rows = (here.position, places, here.cell)
     around = stencil(grid.shape[:-1], grid.box.periodic[:-1], grid.reach).shape[1]
-    return chunked_map(some, rows, max(1, _PAIRS // (around * number.size)))
+    return wide_map(some, rows, max(1, _PAIRS // (around * number.size)))
 
 
 def _windows(column, start, size: int):
@@ -196,7 +196,7 @@ def pick(
         return jnp.where(slots < through[:, -1:], place + entry, row[:, None])
 
     row = own + jnp.arange(words.shape[0], dtype=jnp.int32)
-    return chunked_map(rows, (words, here.cell, row), max(1, _SLOTS // capacity))
+    return wide_map(rows, (words, here.cell, row), max(1, _SLOTS // capacity))
 
 
 def _through_bytes(words):

@@ -14,7 +14,8 @@ import numpy as np
 from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
-from ..compiler_options import COMPILER_OPTIONS
+from ..compiled import full_precision
+from ..compiler_options import platform_options
 from ..integrate import FaultCode, integrate
 from ..io import Lock
 from ..scenes import Scene
@@ -130,6 +131,7 @@ def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
         snapshots = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, later)
         return snapshots, (fault.code, fault.step, fault.particle, count)
 
+    @full_precision
     def share(arrays):  # what one device does
         if batch > 1:
             return jax.vmap(member)(arrays)
@@ -139,6 +141,6 @@ def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
     spec = PartitionSpec(_AXIS)
     program = jax.jit(
         jax.shard_map(share, mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False),
-        compiler_options=COMPILER_OPTIONS,
+        compiler_options=platform_options(),
     )
     return _Run(program, NamedSharding(mesh, spec), mesh.size * batch)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Schedule, Space, Trajectory
+from jaxsph.compiled import full_precision
 from jaxsph.shown import line
 from jaxsph.shown import table as shown_table
 
@@ -197,6 +198,7 @@ def load(path: str | os.PathLike) -> LabelModel:
 
 
 @eqx.filter_jit
+@full_precision
 def _all(law, points):
     return jax.vmap(law)(points)
 
@@ -206,6 +208,7 @@ def _at(law, points) -> np.ndarray:
 
 
 @eqx.filter_jit
+@full_precision
 def _recovered(system, time, coordinates, values) -> Array:
     return jax.vmap(lambda t, a: system.recovered(t, a, values))(
         jnp.asarray(time, coordinates.dtype), coordinates

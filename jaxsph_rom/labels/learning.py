@@ -12,6 +12,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
+from jaxsph.compiled import full_precision
 from jaxsph.integrate import rk4_step
 
 from .cubic_system import CubicSystem, products
@@ -115,6 +116,7 @@ def _finite(error: float) -> float:
 
 
 @eqx.filter_jit
+@full_precision
 def _features(inputs, coordinates, times, values):
     times, values = (jnp.asarray(a, coordinates.dtype) for a in (times, values))
     each = jax.vmap(lambda t, a: products(a, inputs(t, values)))
@@ -159,6 +161,7 @@ class _RollOuts(eqx.Module):
         return CubicSystem(weights / self.size[None, :], self.recovery, self.inputs)
 
     @eqx.filter_jit
+    @full_precision
     def residual(self, weights) -> Float[Array, " numbers"]:
         system, step = self.system(jnp.asarray(weights, self.size.dtype)), self.interval / _STEPS
 
@@ -179,6 +182,7 @@ class _RollOuts(eqx.Module):
         return (off / jnp.sqrt(squares * len(self.wanted))).reshape(-1)
 
     @eqx.filter_jit
+    @full_precision
     def _jacobian(self, weights):
         return jax.jacfwd(lambda w: self.residual(w.reshape(weights.shape)))(weights.reshape(-1))
 

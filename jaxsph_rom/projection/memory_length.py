@@ -13,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxsph.compiled import full_precision
+
 from ..field_advection import ModeAdvection
 from .spectral_radius import krylov_projection, spectral_radius
 
@@ -134,6 +136,7 @@ def projected_jacobian(
 
 
 @eqx.filter_jit
+@full_precision
 def _restricted(model, state, steps: int):
     # an arbitrary direction, the same each time, so that runs repeat
     start = np.random.default_rng(0).normal(size=state.coordinates.shape)

@@ -11,6 +11,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
+from jaxsph.compiled import full_precision
 from jaxsph.scenes import Scene
 
 from ...basis import Basis
@@ -222,6 +223,7 @@ def _about_zero(value, slopes, bends, middle, powers):
 
 
 @eqx.filter_jit
+@full_precision
 def _tested(functions, weights, form, advected, rates, gradients, rates_along, gradients_along):
     """Constant, linear and quadratic part, of what acts at rest and along each function."""
     weighted = functions * weights[None, :, None]

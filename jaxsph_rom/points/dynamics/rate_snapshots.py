@@ -12,6 +12,8 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
+from jaxsph.compiled import full_precision
+
 from ...basis import Basis, InnerProduct, Uncentred, pod
 from .eulerian_rates import EulerianRates
 
@@ -83,6 +85,7 @@ def rate_basis(rates: EulerianRates, basis: Basis, visited: Sequence[VisitedStat
 
 
 @eqx.filter_jit
+@full_precision
 def _parts(rates, modes, centre, values, time, coordinates) -> tuple[Array, ...]:
     def at(state):
         time, a = state

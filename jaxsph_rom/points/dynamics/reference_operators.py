@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxsph import PairTerm, ParticleState, Same, SPHFunctional, VerletList, WallList
+from jaxsph.compiled import full_precision
 from jaxsph.effects import Effect
 from jaxsph.scenes import Scene
 from jaxsph.vector import Vector
@@ -124,6 +125,7 @@ class ReferenceOperators(eqx.Module):
         return ReferenceOperators(functional, self.points, self.neighbors, self.coefficients)
 
     @eqx.filter_jit
+    @full_precision
     def along(
         self, direction: Float[Array, "points fields"], values: Float[Array, " coefficients"]
     ) -> Acting:

@@ -10,6 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from jaxsph.compiled import full_precision
+
 from ...basis import Basis
 from ..dynamics.base import Dynamics
 from ..dynamics.eulerian_rates import EulerianRates
@@ -122,6 +124,7 @@ def indicated(
 
 
 @eqx.filter_jit
+@full_precision
 def _indicated(indicator, system, shown, points, values, time, coordinates):
     def one(member):
         point, values, coordinates = member

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Trajectory
+from jaxsph.compiled import full_precision
 
 from .reduced_flow import mapped_run
 
@@ -41,6 +42,7 @@ class LinearOutput(eqx.Module):
 
     table: Float[Array, "monomials outputs modes_and_one"]
 
+    @full_precision
     def __call__(
         self,
         coordinates: Float[Array, "*times modes"],

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Fluid, Schedule, Trajectory
+from jaxsph.compiled import full_precision
 from jaxsph.integrate import SimulationError
 from jaxsph.interpolation import KernelMap, MovingLeastSquaresMap
 from jaxsph.scenes import Scene
@@ -213,6 +214,7 @@ class ReducedFlow(eqx.Module):
 
 
 @eqx.filter_jit
+@full_precision
 def _run(times, model, coordinates):
     return times.run(model, coordinates)
 
@@ -227,6 +229,7 @@ def mapped_run(
 
 
 @eqx.filter_jit
+@full_precision
 def projection(modes, centre, weights, fields) -> Float[Array, "*times modes"]:
     """Coordinates of fields (G, F, *times) in a basis, in its product."""
     centre = jnp.broadcast_to(centre, modes.shape[:2])
@@ -237,6 +240,7 @@ def projection(modes, centre, weights, fields) -> Float[Array, "*times modes"]:
 
 
 @eqx.filter_jit
+@full_precision
 def _shown(shown, functions, coordinates, fluids):
     """Fields, density and pressure of coordinates."""
     scale, acting = fluids

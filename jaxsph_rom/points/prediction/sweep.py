@@ -14,6 +14,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int
 
 from jaxsph import Schedule
+from jaxsph.compiled import full_precision
 
 from ..dynamics.points_model import PointsModel
 from .reduced_flow import ReducedFlow
@@ -116,6 +117,7 @@ def swept(
 
 
 @eqx.filter_jit
+@full_precision
 def batch_of(system, bound, times, starts, values):
     """Coordinates, fault code and step of members; pure."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsph import Fluid, ParticleState, Schedule, SPHFunctional, Trajectory
+from jaxsph.compiled import full_precision
 from jaxsph.scenes import Scene
 from jaxsph.shown import concrete, line, spread
 from jaxsph.shown import table as shown_table
@@ -353,6 +354,7 @@ def _with_log_density(fields, fluid):
 
 
 @eqx.filter_jit
+@full_precision
 def _all(law, points):
     return jax.vmap(law)(points)
 
