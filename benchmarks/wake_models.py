@@ -61,7 +61,7 @@ def _run(options) -> bool:
         for modes in options.modes
         for unseen in UNSEEN.items()
     ]
-    left = kept.left(cases)
+    left = list(kept.left(cases))
     if left:
         runs = WakeRuns(options.out, options.resolution)
         models = _models(runs, options, sorted({case["modes"] for case in left}))
