@@ -8,7 +8,7 @@ from jax import lax
 
 _SHARES = 8  # sizes are multiples of it, for cores to share evenly: XLA's loop of an odd size
 # takes half as long again
-_WIDER = 32  # times the rows: a list of a million particles in some ten chunks
+_WIDER = 128  # times the rows: a list of a million particles in some five chunks
 
 
 def chunked_map(function, rows, chunk: int):

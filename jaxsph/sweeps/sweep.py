@@ -22,6 +22,7 @@ from ..scenes import Scene
 from ..trajectory import Snapshot
 from . import sweep_file
 from .members import Members, stacked
+from .room import check_room
 from .sweep_file import NOT_RUN, Status, read_status
 
 _ENLARGEMENTS = 8  # of the neighbour list, together a factor of four
@@ -48,14 +49,16 @@ def sweep(
         path: of the HDF5 file.
         batch: members that a device runs side by side, by `jax.vmap`. On a CPU one is best: it uses
             all cores already, and rebuilds its neighbour list only when it must, where a batch
-            builds all lists at every step. An accelerator wants as many as fit its memory.
+            builds all lists at every step. A GPU takes all members of a batch in each kernel, and
+            wants as many as fit its memory.
         progress: is called with the number of members done since its last call.
 
     Returns:
         how each member went; `read_member(path, k)` has its snapshots.
 
     Raises:
-        ValueError: if the scenes differ in more, or the batch is below one.
+        ValueError: if the scenes differ in more, the batch is below one, or a device has not the
+            memory for it; nothing is run then.
         SweepFileError: if the file holds another sweep or cannot be written.
     """
     if batch < 1:
@@ -77,6 +80,8 @@ def _fill(path, members: Members, first: Scene, count: int, batch: int, writes, 
     left = np.flatnonzero(code == NOT_RUN)
     if progress is not None and len(left) < count:
         progress(count - len(left))
+    if not len(left):
+        return
     mesh = Mesh(np.asarray(jax.devices()), (_AXIS,))
     for attempt in range(1 + _ENLARGEMENTS):
         run = _compiled(members, first, mesh, batch)
@@ -138,9 +143,16 @@ def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
         alone = member(jax.tree.map(lambda a: a[0], arrays))
         return jax.tree.map(lambda a: a[None], alone)
 
-    spec = PartitionSpec(_AXIS)
+    spec, size = PartitionSpec(_AXIS), mesh.size * batch
+    sharding = NamedSharding(mesh, spec)
     program = jax.jit(
         jax.shard_map(share, mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False),
         compiler_options=platform_options(),
     )
-    return _Run(program, NamedSharding(mesh, spec), mesh.size * batch)
+    shapes = jax.tree.map(
+        lambda a: jax.ShapeDtypeStruct((size, *a.shape[1:]), a.dtype, sharding=sharding),
+        members.arrays,
+    )
+    program = program.lower(shapes).compile()
+    check_room(program, mesh.local_devices[0], batch)
+    return _Run(program, sharding, size)
