@@ -8,10 +8,12 @@ from typing import Any, final
 
 import numpy as np
 
+from jaxsph import Trajectory
 from jaxsph.integrate import Fault, SimulationError
 
 from ..basis import Energy, InnerProduct
 from ..points import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
+from ..points.prediction.reduced_flow import mapped_run
 from ..points.training.linear_closure import held_back
 from ..points.training.training import check_family
 from .full_runs import FullRuns
@@ -88,7 +90,10 @@ class OnPoints(Method):
         if found.good(0) < len(full.time):
             step = runs.scene(reynolds).time_step
             fault = SimulationError(Fault(found.status[0], found.step[0], -1), step)
-        probed = found.fields(0, runs.probes(reynolds))
+        scene, probes = runs.scene(reynolds), runs.probes(reynolds)
+        probed = found.fields(0, probes)
+        coordinates = flow.project(mapped_run(flow.reference, full, scene.fluid))
+        projected = flow.fields(coordinates, full.time, probes, scene.fluid)
         told = {
             "modes": flow.basis.size,
             "projection": "galerkin",
@@ -100,13 +105,20 @@ class OnPoints(Method):
             "offline_seconds": trained.training["offline_seconds"]
             + trained.training.get("closure_seconds", 0.0),
         }
-        profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
         made_of = partial(self._made_of, runs, trained_on, flow)
-        return ReducedRun(reynolds, found.fields(0), profile, fault, told, made_of, trained)
+        return ReducedRun(
+            reynolds, found.fields(0), _profile(probed), fault, told, made_of, trained,
+            _profile(projected),
+        )  # fmt: skip
 
     def _made_of(self, runs: FullRuns, trained_on, flow) -> ModelBasis:
         lagrangian = runs.lagrangian_basis(trained_on, self.product)
         return ModelBasis(flow.basis, lagrangian, flow.reference, {})
+
+
+def _profile(probed: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity norm and pressure over time, each (S, P)."""
+    return np.linalg.norm(probed.velocity, axis=2), probed.pressure
 
 
 def _label(training: dict[str, Any]) -> str:
