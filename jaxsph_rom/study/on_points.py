@@ -48,8 +48,7 @@ class OnPoints(Method):
         return type(self.product).__name__
 
     def check(self, runs, experiment):
-        if self.closed:
-            self._closure(experiment)
+        self.closure(experiment)
         check_family(self._family(runs), _parameters(experiment.trained_on))
 
     def run(self, runs, experiment):
@@ -63,7 +62,7 @@ class OnPoints(Method):
             experiment.modes,
             runs=[runs.full(reynolds) for reynolds in sorted(experiment.trained_on, reverse=True)],
             formulation=formulation,
-            closure=self._closure(experiment) if self.closed else None,
+            closure=self.closure(experiment),
             progress=runs.progress,
         )
         for model in trained:
@@ -73,7 +72,14 @@ class OnPoints(Method):
     def _family(self, runs: FullRuns) -> Family:
         return Family(lambda reynolds: runs.scene(reynolds)) if self.family is None else self.family
 
-    def _closure(self, experiment: Experiment) -> LinearClosure:
+    def closure(self, experiment: Experiment) -> LinearClosure | None:
+        """That of the flows, if they have one.
+
+        Raises:
+            ValueError: for a judge that is no training run, before anything is run.
+        """
+        if not self.closed:
+            return None
         if self.judge is None:
             return LinearClosure(held_back(_parameters(experiment.trained_on)))
         if self.judge not in experiment.trained_on:
