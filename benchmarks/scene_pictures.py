@@ -18,6 +18,7 @@ from jaxsph.plotting import FIELDS, snapshot_figure
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 _DPI = 90
+_FIELDS = {"hydrostatic-tank": "pressure", "cylinder": "vorticity"}
 # what each is run with; the dam break has a moving picture of its own
 OPTIONS = {
     "taylor-green": "--resolution 40 --t-end 0.4",
@@ -37,6 +38,7 @@ OPTIONS = {
     "piston-wave-maker": "--t-end 2.4",
     "open-cavity": "--resolution 40 --t-end 0.5",
     "channel-cylinder": "--resolution 33 --t-end 2",
+    "cylinder": "--resolution 10 --width 6 --upstream 4 --downstream 6 --t-end 60",
 }
 
 
@@ -57,7 +59,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def draw(name: str, trajectory: Path) -> None:
     """The picture of a run."""
-    field = FIELDS["pressure" if name == "hydrostatic-tank" else "velocity"]
+    field = FIELDS[_FIELDS.get(name, "velocity")]
     figure = snapshot_figure(*read_snapshot(trajectory), (field,), read_walls(trajectory),
                              read_box(trajectory))  # fmt: skip
     figure.savefig(FIGURES / f"scene_{name.replace('-', '_')}.png", dpi=_DPI, facecolor="white")
