@@ -32,6 +32,7 @@ from .reduced_tables import (
     scheme_models,
 )
 from .table_text import ROOT
+from .wake_tables import cylinder_wake, wake_models
 
 PAGES = ROOT / "docs" / "measured"
 _BLOCK = re.compile(r"(<!-- table ([\w-]+) -->\n).*?(?=^<!-- end -->)", re.MULTILINE | re.DOTALL)
@@ -72,6 +73,8 @@ TABLES: dict[str, Callable[[], str]] = {
         cheapest_settings,
         label_models,
         label_galerkin,
+        cylinder_wake,
+        wake_models,
     )  # fmt: skip
 }
 

@@ -32,6 +32,11 @@ OPTIONS = {
     "rotating-square-patch": "--resolution 40",
     "shear-layer": "--resolution 48",
     "standing-wave": "--resolution 60 --t-end 0.3",
+    "poiseuille-open": "--resolution 20 --t-end 1",
+    "sloshing": "--t-end 3",
+    "piston-wave-maker": "--t-end 2.4",
+    "open-cavity": "--resolution 40 --t-end 0.5",
+    "channel-cylinder": "--resolution 33 --t-end 2",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import time as clock
 import warnings
 from collections.abc import Callable
@@ -29,6 +30,7 @@ from .timing import Timing
 from .trajectory import Snapshot, Trajectory
 from .wall_forces import WallForces
 
+_log = logging.getLogger(__name__)
 _LOADS, _MEANS = ("forces", "torques"), ("mean_forces", "mean_torques")
 _ENLARGEMENTS = 8  # of the neighbour list in one run, together a factor of four
 
@@ -72,7 +74,8 @@ def simulate(
 
     Run time excludes compilation: the first interval runs twice, once to compile. A neighbour
     list that overflows is allocated anew with a fifth more room, up to eight times, and the run
-    goes on from its last snapshot, with a warning.
+    goes on from its last snapshot, with a warning. The logger `jaxsph.simulate` is told of the
+    compilation and of the end (info), and of each snapshot (debug).
 
     Args:
         model: full or reduced.
@@ -174,6 +177,7 @@ def simulate(
         elapsed = clock.perf_counter() - start
         if not compiled:  # this interval runs once more, for its time without compilation
             compiled, compile_seconds = True, compile_seconds + elapsed
+            _log.info("compiled in %.3g s; from step %d to %d", elapsed, step, schedule.steps)
             continue
         if int(fault.code) == FaultCode.NEIGHBOR_OVERFLOW and len(enlarged_at) < _ENLARGEMENTS:
             larger = model.enlarged()
@@ -191,8 +195,10 @@ def simulate(
         run_seconds += elapsed
         state, step = new, step + each
         record(step, snapshot, means)
+        _log.debug("step %d, t = %.4g s", step, step * time_step)
         if progress is not None:
             progress(each)
+    _log.info("%d steps in %.3g s", step - first_step, run_seconds)
     return trajectory()
 
 

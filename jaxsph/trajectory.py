@@ -153,6 +153,23 @@ class Trajectory(eqx.Module):
 
         return dataset(self)
 
+    def to_pyvista(self, time: float | None = None) -> Any:
+        """The particles of the snapshot nearest to a time as a `pyvista.PolyData`, in SI units.
+
+        Point data are `velocity`, `density` and `pressure`, field data `time`; vectors in two
+        dimensions get a third component of zero. `jaxsph.io.write_vtkhdf` writes all times.
+
+        Args:
+            time: [s]; the end if none is given.
+
+        Raises:
+            ImportError: if PyVista is not installed.
+        """
+        from .io.point_cloud import point_cloud
+
+        number = -1 if time is None else self.nearest(time)
+        return point_cloud(float(self.time[number]), self.snapshot(number))
+
     def _one_by_one(self, every: int) -> Iterator[Trajectory]:
         if every < 1:
             raise ValueError(f"every: every {every}-th snapshot; give at least 1.")

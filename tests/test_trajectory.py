@@ -122,6 +122,28 @@ def test_without_xarray_the_error_says_what_to_install(tmp_path, monkeypatch):
         run(tmp_path / "t.h5").to_xarray()
 
 
+def test_without_pyvista_the_error_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)  # cannot be imported
+    with pytest.raises(ImportError, match=r"pyvista is not there; install .* jaxsph\[pyvista\]"):
+        run(tmp_path / "t.h5").to_pyvista()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_point_cloud_has_the_particles_and_their_fields(tmp_path, dim):
+    pytest.importorskip("pyvista", reason="pyvista is not installed")
+    found = run(tmp_path / "t.h5", dim=dim)
+    for time, number in ((None, -1), (float(found.time[1]) + 1e-6, 1)):
+        cloud = found.to_pyvista(time)
+        assert cloud.n_points == found.particles and cloud.n_verts == found.particles
+        assert cloud.field_data["time"] == [found.time[number]]
+        for name, values in (("velocity", found.velocity), ("position", found.position)):
+            mine = cloud.points if name == "position" else cloud.point_data[name]
+            np.testing.assert_array_equal(mine[:, :dim], values[number])
+            assert mine.shape[1] == 3 and not mine[:, dim:].any()
+        np.testing.assert_array_equal(cloud.point_data["density"], found.density[number])
+        np.testing.assert_array_equal(cloud.point_data["pressure"], found.pressure[number])
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_labelled_arrays(tmp_path, dim):
     pytest.importorskip("xarray", reason="xarray is not installed")

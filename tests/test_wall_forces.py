@@ -82,6 +82,7 @@ def stirred(scene):
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("scheme", [Consistent(), DeltaPlus()], ids=["consistent", "delta-plus"])
+@pytest.mark.run_once
 def test_walls_get_what_the_fluid_loses(scheme, dim):
     """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid;
     and their moments, where all pairs of the fluid pull along the line between them."""
@@ -107,6 +108,7 @@ def test_walls_get_what_the_fluid_loses(scheme, dim):
     assert torques["ball"].shape == (() if dim == 2 else (3,))
 
 
+@pytest.mark.run_once
 def test_parts_add_up_to_the_whole():
     scene = vessel(Consistent())
     rest = WallPart("rest", ~BallRegion((0.5, 0.5), 0.2) & BoxRegion((-1.0, 0.0), (2.0, 2.0)))
@@ -118,6 +120,7 @@ def test_parts_add_up_to_the_whole():
         np.testing.assert_allclose(total, each["walls"], rtol=1e-10, atol=1e-8)
 
 
+@pytest.mark.run_once
 def test_tank_at_rest_weighs_what_its_water_weighs():
     scene = vessel(Consistent(), resolution=20)
     forces, torques = WallForces.of(scene)(scene.model(), START, at_rest(scene))
@@ -133,6 +136,7 @@ def test_tank_at_rest_weighs_what_its_water_weighs():
 
 
 @pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.run_once
 def test_body_in_uniform_pressure_feels_none(dim):
     scene = vessel(Consistent(), dim, 16 if dim == 2 else 12, gravity=0.0)
     density = jnp.full_like(scene.state.density, 1010.0)
@@ -145,6 +149,7 @@ def test_body_in_uniform_pressure_feels_none(dim):
     assert forces["bottom"][-1] == pytest.approx(-pressure, rel=1e-12)
 
 
+@pytest.mark.run_once
 def test_shear_drags_the_plates():
     """A linear profile: -mu U / H on the plate at rest, its opposite on the other."""
     scene = couette(16, arrangement=jaxsph.arrangements.Lattice())
@@ -165,6 +170,7 @@ def test_shear_drags_the_plates():
 
 
 @pytest.mark.parametrize("scheme", [Consistent(), DeltaPlus()], ids=["consistent", "delta-plus"])
+@pytest.mark.run_once
 def test_forces_are_differentiable(scheme):
     scene = conserving(vessel(scheme))
     state, model, measure = stirred(scene), scene.model(), WallForces.of(scene)
@@ -183,6 +189,7 @@ def test_forces_are_differentiable(scheme):
         assert float(jax.grad(drag)(START)) == pytest.approx(slope, rel=1e-9)
 
 
+@pytest.mark.run_once
 def test_a_list_without_room_is_made_anew_or_the_force_is_none():
     scene = vessel(DeltaPlus())
     state, model, measure = stirred(scene), scene.model(margin=2.0), WallForces.of(scene)
@@ -225,6 +232,7 @@ def run(tmp_path_factory):
     return path, jaxsph.run_scene(vessel(Consistent()), path)
 
 
+@pytest.mark.run_once
 def test_forces_are_kept_with_each_snapshot(run):
     path, trajectory = run
     again = read_trajectory(path)

@@ -18,6 +18,7 @@ from .density_diffusion import DensityDiffusion as DensityDiffusion
 from .free_surface import FreeSurface as FreeSurface
 from .fringe import Fringe as Fringe
 from .fringe import ParabolicProfile as ParabolicProfile
+from .fringe import UniformProfile as UniformProfile
 from .fringe import Varying as Varying
 from .gripped_pressure_force import GrippedPressureForce as GrippedPressureForce
 from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity

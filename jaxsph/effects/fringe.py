@@ -35,7 +35,7 @@ class Fringe(Effect):
         start, end: of the fringe along the first axis [m] (static).
 
     Raises:
-        ValueError: if the end does not lie behind the start; on points that stay.
+        ValueError: if the end does not lie behind the start.
     """
 
     profile: eqx.Module
@@ -46,12 +46,6 @@ class Fringe(Effect):
     def __check_init__(self):
         if not self.start < self.end:
             raise ValueError(f"fringe: its end {self.end:g} m must lie behind {self.start:g} m.")
-
-    def on_fixed_points(self):
-        raise ValueError(
-            "effects: Fringe takes the place of all other accelerations, which models on points "
-            "that stay do not know; choose a scene that is periodic or closed."
-        )
 
     def step_limit(self, fluid, space):
         acting = self.rate > 0.0
@@ -85,6 +79,22 @@ class ParabolicProfile(eqx.Module):
         y = position[:, 1]
         speed = (4.0 / self.height**2) * self.peak * y * (self.height - y)
         return jnp.zeros_like(position).at[:, 0].set(speed)
+
+
+class UniformProfile(eqx.Module):
+    """u = U along the first axis, everywhere and at all times.
+
+    Args:
+        speed: U [m/s].
+    """
+
+    speed: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def __call__(
+        self, position: Float[Array, "points dim"], time: Float[Array, ""]
+    ) -> Float[Array, "points dim"]:
+        """Velocities [m/s] at positions [m], the same at all times."""
+        return jnp.zeros_like(position).at[:, 0].set(self.speed)
 
 
 class Varying(eqx.Module):

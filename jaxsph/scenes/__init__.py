@@ -7,9 +7,11 @@ from .channel_cylinder import channel_cylinder as channel_cylinder
 from .composed import composed as composed
 from .continued import continued as continued
 from .couette import couette as couette
+from .cylinder import cylinder as cylinder
 from .dam_break import dam_break as dam_break
 from .elliptic_drop import elliptic_drop as elliptic_drop
 from .enclosed import enclosed_flow as enclosed_flow
+from .flow_through import flow_through as flow_through
 from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
 from .lid_driven_cavity import lid_driven_cavity as lid_driven_cavity
@@ -38,6 +40,7 @@ SCENES = {
     "poiseuille": poiseuille,
     "poiseuille-open": poiseuille_open,
     "channel-cylinder": channel_cylinder,
+    "cylinder": cylinder,
     "hydrostatic-tank": hydrostatic_tank,
     "dam-break": dam_break,
     "elliptic-drop": elliptic_drop,

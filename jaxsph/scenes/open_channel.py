@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,17 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..arrangements import Arrangement
-from ..domain import Box
-from ..effects import Fringe, ParabolicProfile
+from ..effects import ParabolicProfile
 from ..kernels import Kernel
 from ..schemes import Scheme
 from ..walls import BoxRegion, Region, WallPart
-from .enclosed import enclosed_flow
+from .flow_through import flow_through
 from .scales import Scale
 from .scene import Scene
 from .solution import ExactFlow
-
-_RATE = 0.3  # of a fringe, times h / c0: half of what the longest step stands
 
 
 def open_channel(
@@ -70,38 +65,28 @@ def open_channel(
     Raises:
         ValueError: as `enclosed_flow`.
     """
-    spacing = height / scale.resolution
-    whole = spacing * math.ceil((length + fringe) / spacing - 1e-9)
     region: Region = BoxRegion((-np.inf, 0.0), (np.inf, height))
-    region = region if obstacle is None else region & ~obstacle
     parabola = ParabolicProfile(jnp.asarray(1.5 * mean_speed), height)
-    profile = parabola if inflow is None else inflow
-    rate = jnp.asarray(_RATE * 1.5 * mean_speed / (mach * scale.h_over_dx * spacing))
-    scene = enclosed_flow(
+    return flow_through(
         name,
-        box=Box((0.0, 0.0), (whole, height), (True, False)),
-        fluid_region=region,
+        length=length,
+        fringe=fringe,
+        across=(0.0, height),
+        region=region if obstacle is None else region & ~obstacle,
+        side=height,
+        speed=1.5 * mean_speed,
+        inflow=parabola if inflow is None else inflow,
+        start=start,
+        solution=solution,
+        parts=parts,
         scale=scale,
         end_time=end_time,
-        reference_density=1.0,
-        reference_speed=1.5 * mean_speed,
-        mach=mach,
         viscosity=viscosity,
-        scheme=scheme,
-        side=height,
-        parts=parts,
+        mach=mach,
         layers=layers,
         arrangement=arrangement,
         kernel=kernel,
+        scheme=scheme,
         dtype=dtype,
         parameters=parameters,
-    )
-    state = scene.state
-    began = jnp.zeros((), state.position.dtype)
-    flowing = profile(state.position, began) if start is None else start(state.position)
-    return dataclasses.replace(
-        scene,
-        effects=(*scene.effects, Fringe(profile, rate, length, whole)),
-        state=dataclasses.replace(state, velocity=flowing),
-        solution=solution,
     )

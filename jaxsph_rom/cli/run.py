@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -212,6 +213,9 @@ def _study(options, plan: Plan, folder: Path) -> Study:
     check_closure(options)
     moving, experiments = _on_particles(options, plan), plan.experiments()
     on_points, on_particles = "tensor" in options.hyper, "none" in options.hyper
+    fixed = OnPoints(formulation(options), moving.product, closed, options.held_back)
+    for experiment in experiments if on_points else ():
+        fixed.closure(experiment)
 
     def check(scene: Scene) -> None:
         moving.interpolation.check(scene.state.position, scene.space, options.spline_order)
@@ -225,8 +229,7 @@ def _study(options, plan: Plan, folder: Path) -> Study:
 
     points = [{"reynolds": number} for number in (*plan.train, *plan.predict)]
     family = scene_maker(options, plan, points, folder, on_points, check, trained)
-    fixed = OnPoints(formulation(options), moving.product, closed, options.held_back, family)
-    methods = {"none": moving, "tensor": fixed}
+    methods = {"none": moving, "tensor": replace(fixed, family=family)}
     return Study(
         lambda reynolds: family.make(reynolds=reynolds),
         folder,

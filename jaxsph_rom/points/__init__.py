@@ -30,6 +30,7 @@ from .parameters import Between as Between
 from .parameters import Family as Family
 from .parameters import Law as Law
 from .prediction import Indicator as Indicator
+from .prediction import LinearOutput as LinearOutput
 from .prediction import Prediction as Prediction
 from .prediction import Recovery as Recovery
 from .prediction import ReducedFlow as ReducedFlow
@@ -37,6 +38,7 @@ from .prediction import Sweep as Sweep
 from .prediction import TracerModel as TracerModel
 from .prediction import TracerState as TracerState
 from .prediction import TrainedModel as TrainedModel
+from .prediction import fit_forces as fit_forces
 from .prediction import fit_recovery as fit_recovery
 from .prediction import mapped_run as mapped_run
 from .prediction import sweep as sweep

@@ -58,6 +58,7 @@ class ReducedRun:
         told: values of the report's `Case` that only the method knows.
         made_of: tells what the model is made of.
         model: that runs at any parameters, where the method makes one.
+        projected: `profile` of the full run as the basis can hold it, where the method knows it.
     """
 
     reynolds: float
@@ -67,6 +68,7 @@ class ReducedRun:
     told: dict[str, Any]
     made_of: Callable[[], ModelBasis]
     model: TrainedModel | None = None
+    projected: tuple[np.ndarray, np.ndarray] | None = None
 
 
 class Method(abc.ABC):

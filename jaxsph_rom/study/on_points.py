@@ -8,10 +8,12 @@ from typing import Any, final
 
 import numpy as np
 
+from jaxsph import Trajectory
 from jaxsph.integrate import Fault, SimulationError
 
 from ..basis import Energy, InnerProduct
 from ..points import Family, Formulation, LinearClosure, TrainedModel, formulation_for, train_each
+from ..points.prediction.reduced_flow import mapped_run
 from ..points.training.linear_closure import held_back
 from ..points.training.training import check_family
 from .full_runs import FullRuns
@@ -46,8 +48,7 @@ class OnPoints(Method):
         return type(self.product).__name__
 
     def check(self, runs, experiment):
-        if self.closed:
-            self._closure(experiment)
+        self.closure(experiment)
         check_family(self._family(runs), _parameters(experiment.trained_on))
 
     def run(self, runs, experiment):
@@ -61,7 +62,7 @@ class OnPoints(Method):
             experiment.modes,
             runs=[runs.full(reynolds) for reynolds in sorted(experiment.trained_on, reverse=True)],
             formulation=formulation,
-            closure=self._closure(experiment) if self.closed else None,
+            closure=self.closure(experiment),
             progress=runs.progress,
         )
         for model in trained:
@@ -71,7 +72,14 @@ class OnPoints(Method):
     def _family(self, runs: FullRuns) -> Family:
         return Family(lambda reynolds: runs.scene(reynolds)) if self.family is None else self.family
 
-    def _closure(self, experiment: Experiment) -> LinearClosure:
+    def closure(self, experiment: Experiment) -> LinearClosure | None:
+        """That of the flows, if they have one.
+
+        Raises:
+            ValueError: for a judge that is no training run, before anything is run.
+        """
+        if not self.closed:
+            return None
         if self.judge is None:
             return LinearClosure(held_back(_parameters(experiment.trained_on)))
         if self.judge not in experiment.trained_on:
@@ -88,7 +96,10 @@ class OnPoints(Method):
         if found.good(0) < len(full.time):
             step = runs.scene(reynolds).time_step
             fault = SimulationError(Fault(found.status[0], found.step[0], -1), step)
-        probed = found.fields(0, runs.probes(reynolds))
+        scene, probes = runs.scene(reynolds), runs.probes(reynolds)
+        probed = found.fields(0, probes)
+        coordinates = flow.project(mapped_run(flow.reference, full, scene.fluid))
+        projected = flow.fields(coordinates, full.time, probes, scene.fluid)
         told = {
             "modes": flow.basis.size,
             "projection": "galerkin",
@@ -100,13 +111,20 @@ class OnPoints(Method):
             "offline_seconds": trained.training["offline_seconds"]
             + trained.training.get("closure_seconds", 0.0),
         }
-        profile = np.linalg.norm(probed.velocity, axis=2), probed.pressure
         made_of = partial(self._made_of, runs, trained_on, flow)
-        return ReducedRun(reynolds, found.fields(0), profile, fault, told, made_of, trained)
+        return ReducedRun(
+            reynolds, found.fields(0), _profile(probed), fault, told, made_of, trained,
+            _profile(projected),
+        )  # fmt: skip
 
     def _made_of(self, runs: FullRuns, trained_on, flow) -> ModelBasis:
         lagrangian = runs.lagrangian_basis(trained_on, self.product)
         return ModelBasis(flow.basis, lagrangian, flow.reference, {})
+
+
+def _profile(probed: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity norm and pressure over time, each (S, P)."""
+    return np.linalg.norm(probed.velocity, axis=2), probed.pressure
 
 
 def _label(training: dict[str, Any]) -> str:

@@ -35,6 +35,8 @@ class Outcome:
         profile: velocity norm and pressure on the probes over time, each (S, P).
         made_of: tells what the model is made of.
         model: that runs at any parameters, where the method makes one.
+        floor: discrepancy of velocity and pressure of the full run's own projection, where that is
+            known: what no model in this basis is below for long.
     """
 
     case: Case
@@ -45,6 +47,7 @@ class Outcome:
     profile: tuple[np.ndarray, np.ndarray]
     made_of: Callable[[], ModelBasis]
     model: TrainedModel | None = None
+    floor: tuple[np.ndarray, np.ndarray] | None = None
 
 
 class Study:
@@ -105,11 +108,16 @@ class Study:
         time = run.trajectory.time
         truth = tuple(a[: len(time)] for a in self.runs.profile(run.reynolds))
         percent = [_percent(a, b) for a, b in zip(truth, run.profile, strict=True)]
+        floor = None
+        if run.projected is not None:
+            held = (values[: len(time)] for values in run.projected)
+            floor = tuple(_percent(a, b) for a, b in zip(truth, held, strict=True))
         judged, fault = time >= min(self.judged_from, time[-1]), run.fault
         apart = np.abs(truth[1] - run.profile[1]).mean(axis=1)[judged]
         uniform = is_noise(truth[1], scene.fluid)
         if uniform:
             percent[1] = np.full(len(time), np.nan)
+            floor = None if floor is None else (floor[0], percent[1])
         case = Case(
             scene=scene.name,
             reynolds=run.reynolds,
@@ -131,7 +139,9 @@ class Study:
             fault_time=None if fault is None else fault.step * scene.time_step,
             **run.told,
         )
-        return Outcome(case, time, *percent, run.trajectory, run.profile, run.made_of, run.model)
+        return Outcome(
+            case, time, *percent, run.trajectory, run.profile, run.made_of, run.model, floor
+        )
 
 
 def _percent(reference: np.ndarray, values: np.ndarray) -> np.ndarray:

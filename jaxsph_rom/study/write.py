@@ -97,10 +97,14 @@ def write_study(
     history = discrepancy_history(
         [(_name(o), o.time, o.velocity_percent, o.pressure_percent) for o in outcomes],
         folder / "discrepancy.png",
+        [o.floor for o in outcomes],
     )
     profiles = _profiles(study.runs, outcomes, folder / "centre_line.png", profile_time)
+    caption = "Relative discrepancy of each reduced run from its full model over time"
+    if any(outcome.floor is not None for outcome in outcomes):
+        caption += ", dotted that of the full run in the same basis, a floor of its models"
     shown = [
-        (history, "Relative discrepancy of each reduced run from its full model over time."),
+        (history, f"{caption}."),
         (profiles, "Velocity norm and pressure on the line that runs are compared on."),
     ]
     if first.space.box.dim == 2:

@@ -49,11 +49,6 @@ def test_inflow_may_be_differentiated(scene):
     assert slope == pytest.approx(float(total(2.0) - total(1.0)), rel=1e-9)
 
 
-def test_reduced_models_on_points_refuse_it(scene):
-    with pytest.raises(ValueError, match="Fringe takes the place"):
-        scene.effects[-1].on_fixed_points()
-
-
 def test_bad_fringe_is_refused():
     with pytest.raises(ValueError, match="must lie behind"):
         Fringe(ParabolicProfile(jnp.ones(()), 1.0), jnp.ones(()), 2.0, 1.0)

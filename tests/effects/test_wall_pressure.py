@@ -66,6 +66,7 @@ def test_a_force_that_is_appended_is_known_to_walls(tank):
 
 
 @pytest.mark.parametrize("make", [hydrostatic_tank, dam_break])
+@pytest.mark.run_once
 def test_gravity_stands_once_and_its_derivative_is_that_of_all_it_does(make):
     options = {"scheme": DeltaPlus()} if make is hydrostatic_tank else {}
     scene = make(20, end_time=0.1, **options)

@@ -51,6 +51,7 @@ def test_segments_keep_what_is_asked_for_and_grow_as_the_root():
 
 
 @pytest.mark.parametrize("make", [gradients.periodic, gradients.walled, gradients.reduced])
+@pytest.mark.run_once
 def test_gradients_through_the_loop_against_differences(make):
     """Through rebuilt lists, walls, the shift velocity's limiter, and a reduced model."""
     case = gradients.accuracy(make(12), 8)
@@ -60,6 +61,7 @@ def test_gradients_through_the_loop_against_differences(make):
         assert row["forward_deviation"] < 1e-9, row
 
 
+@pytest.mark.run_once
 def test_memory_of_a_gradient_grows_as_the_root_of_the_steps():
     """Of the compiled programs, so that nothing has to run; kept whole it would be 16 times."""
     flow, base = gradients.periodic(12), jnp.asarray([1.0, 1.0, 0.0])
@@ -71,6 +73,7 @@ def test_memory_of_a_gradient_grows_as_the_root_of_the_steps():
     assert memory(256) < 4.5 * memory(16)
 
 
+@pytest.mark.run_once
 def test_a_batch_of_gradients_is_each_of_them():
     flow = gradients.periodic(12)
     slope = jax.grad(lambda p: flow.final(p, 4)[0])

@@ -85,6 +85,7 @@ def test_a_broken_state_is_named_not_stepped_over(scene):
     assert error.value.code in (FaultCode.DENSITY_OUT_OF_BOUNDS, FaultCode.NOT_FINITE)
 
 
+@pytest.mark.run_once
 def test_automatic_steps_have_a_reverse_mode(scene):
     """The gradient in the viscosity against central differences; the limits carry no derivative."""
     model, dt = scene.model(), jnp.asarray(scene.time_step)

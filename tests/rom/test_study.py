@@ -5,7 +5,7 @@ import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
-from jaxsph_rom import Experiment, MeanCentred, OnParticles, Study
+from jaxsph_rom import Experiment, MeanCentred, OnParticles, OnPoints, Study
 from jaxsph_rom.study import study as study_module
 
 
@@ -37,6 +37,19 @@ def test_a_study_about_the_mean(tmp_path):
     assert basis.centre.shape == basis.modes.shape[:2]
     own = OnParticles().basis(study.runs, experiment, 2)
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
+
+
+def test_models_on_points_have_the_floor_of_their_basis_beside_them(tmp_path):
+    study = Study(make, tmp_path, OnPoints())
+    one, two = study.run(Experiment((100.0,), (100.0,), (1, 2)))
+    for outcome in (one, two):
+        found = outcome.velocity_percent, outcome.pressure_percent
+        for percent, floor in zip(found, outcome.floor, strict=True):
+            assert floor.shape == percent.shape == outcome.time.shape
+            assert floor[0] == pytest.approx(percent[0], rel=1e-6)  # where a run starts
+    # the second mode of a decay holds what the first leaves
+    assert np.median(two.floor[0]) < np.median(one.floor[0])
+    assert np.median(two.floor[0]) < 1.01 * np.median(two.velocity_percent)
 
 
 def test_a_map_that_does_not_fit_is_met_before_a_run(tmp_path):

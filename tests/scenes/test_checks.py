@@ -39,6 +39,7 @@ def box_of_fluid(dtype=jnp.float64, origin=0.0, density=1000.0, number=float, st
     )
 
 
+@pytest.mark.run_once
 def test_numbers_of_numpy_are_taken_into_the_particles_precision():
     scene = box_of_fluid(jnp.float32, number=np.float64)
     found = {leaf.dtype for leaf in jax.tree.leaves(scene) if eqx.is_inexact_array(leaf)}

@@ -37,6 +37,7 @@ from jaxsph.scenes.standing_wave import FREQUENCY
 
 SMALL = {
     "channel-cylinder": 41,
+    "cylinder": 10,
     "couette": 25,
     "poiseuille": 25,
     "dam-break": 50,

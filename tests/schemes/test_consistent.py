@@ -54,6 +54,7 @@ def test_a_rigid_rotation_is_not_shifted_and_feels_no_viscosity():
 
 
 @pytest.mark.parametrize("options", [dict(side=12, periodic=True), dict(side=7)], ids=str)
+@pytest.mark.run_once
 def test_derivatives_of_the_rates(options):
     scene = vessel(viscosity=0.05, force=Gravity(jnp.asarray([0.1, -0.3])), **options)
     functional, neighbors = scene.functional(), scene.search().build(scene.state.position)

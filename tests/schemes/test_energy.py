@@ -49,6 +49,7 @@ def energy_rate(scene, state):
     ],
     ids=str,
 )
+@pytest.mark.run_once
 def test_pressure_and_continuity_only_exchange_energy(options):
     scene = with_pressure_alone(vessel(**options))
     assert abs(energy_rate(scene, disturbed(scene))) < 1e-13  # round-off

@@ -113,6 +113,7 @@ def run(scene, steps, stepping=FixedSteps(), interval=None):  # noqa: B008
 
 
 @pytest.mark.parametrize("slip", SLIPS.values(), ids=SLIPS.keys())
+@pytest.mark.run_once
 def test_a_vessel_at_constant_velocity_is_one_at_rest(slip):
     """Galilei. `ShiftingTransport` is left out: the paper's form of it depends on the frame."""
     boost, steps = jnp.asarray([1.5, -0.8]), 60  # to 4.5 and 2.4 dx away: lists are built anew
@@ -126,6 +127,7 @@ def test_a_vessel_at_constant_velocity_is_one_at_rest(slip):
     np.testing.assert_allclose(gone.density, still.density, rtol=1e-13)
 
 
+@pytest.mark.run_once
 def test_a_shaken_vessel_is_one_at_rest_under_inertia():
     """-d''(t) is a body force in the vessel's frame. A stage of RK4 knows where the vessel is
     exactly, and particles to the stage's order only: the two differ by O(dt^4)."""
@@ -272,6 +274,7 @@ def test_steps_are_shorter_where_a_body_is_fast():
 # ------------------------------------------------------------------ gradients
 
 
+@pytest.mark.run_once
 def test_derivatives_by_the_amplitude_fit_central_differences():
     start = scene(moved(Shaken(jnp.asarray([0.05, -0.02]))), NoSlip(), repelling=ROOM)
     model, dt = start.model(), jnp.asarray(start.time_step)

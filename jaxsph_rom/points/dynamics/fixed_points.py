@@ -107,10 +107,24 @@ def check_quadratic(scene: Scene, functional: SPHFunctional, points, neighbors) 
 
 
 def _rates_by_effect(functional: SPHFunctional, time, state, neighbors) -> list[dict[str, Array]]:
-    """Rates of velocity and density by each effect, in the list's order."""
+    """Rates of velocity and density by each effect, and what it makes of those of all, in the
+    list's order."""
     context, fields, sums = functional.sums(time, state, neighbors)
-    found = [effect.rates(context, fields, sums) for effect in functional.effects]
-    return [{k: v for k, v in rates.items() if k != "position"} for rates in found]
+    none, one = (_uniform(fields, value) for value in (0.0, 1.0))
+    found = []
+    for effect in functional.effects:
+        rates = effect.rates(context, fields, sums)
+        of_none, of_one = (effect.governed(context, fields, rate) for rate in (none, one))
+        found.append(
+            {name: rate for name, rate in rates.items() if name != "position"}
+            | {f"of none, {name}": rate for name, rate in of_none.items()}
+            | {f"of one, {name}": rate for name, rate in of_one.items()}
+        )
+    return found
+
+
+def _uniform(fields: dict[str, Array], value: float) -> dict[str, Array]:
+    return {name: jnp.full_like(fields[name], value) for name in ("velocity", "density")}
 
 
 def _differ(mine, theirs, scale) -> bool:

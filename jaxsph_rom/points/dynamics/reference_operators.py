@@ -51,6 +51,14 @@ class Acting(NamedTuple):
     gradients_along: Float[Array, "points fields dim"]
 
 
+class Advected(NamedTuple):
+    """How much of its advection each field keeps, and the gradient of that: less than all where an
+    effect governs the rates of all others, as a fringe does."""
+
+    share: Float[Array, "points fields"]
+    gradient: Float[Array, "points fields dim"]
+
+
 class ReferenceOperators(eqx.Module):
     """The SPH equations of a scene at fixed points x_G of constant volume V_0 = dx^n.
 
@@ -124,23 +132,41 @@ class ReferenceOperators(eqx.Module):
         """Rates of (r, u) without advection and grad (r, u), at theta: at rest and along a
         direction. One program serves all who ask, whatever the number of modes."""
         at = self.at(values)
-        acting = (CarriedGradients(), *filter(acts_on_ghosts, at.functional.effects))
-        carrying = with_effects(at.functional, acting)
         time = jnp.zeros((), direction.dtype)
 
-        def rates(fields):
+        def acting(fields):
             found = at.functional(time, self._state(fields), self.neighbors)
-            return jnp.concatenate([found.density[:, None], found.velocity], axis=1)
+            rates = jnp.concatenate([found.density[:, None], found.velocity], axis=1)
+            return rates, at._gradients(fields)
 
-        def gradients(fields):
-            _, _, sums = carrying.sums(time, self._state(fields), self.neighbors)
-            count, dim = self.points.shape
-            velocity = sums["carried_velocity"].reshape(count, dim, dim)
-            found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
+        value, slope = jax.jvp(acting, (self.rest,), (direction,))
+        return Acting(*value, *slope)
+
+    def advected(self) -> Advected | None:
+        """What of the advection of (r, u) is left where effects govern the rates of all others;
+        none if that is all of it everywhere."""
+        found = self._advected()
+        return None if bool(jnp.all(found.share == 1.0)) else found
+
+    @eqx.filter_jit
+    def _advected(self) -> Advected:
+        time = jnp.zeros((), self.points.dtype)
+        context, fields, _ = self.functional.sums(time, self._state(self.rest), self.neighbors)
+
+        def governed(value):
+            rates = {n: jnp.full_like(fields[n], value) for n in ("density", "velocity")}
+            for effect in self.functional.effects:
+                rates = effect.governed(context, fields, rates)
+            found = jnp.concatenate([rates["density"][:, None], rates["velocity"]], axis=1)
             return self.neighbors.unsort(found)
 
-        value, slope = jax.jvp(lambda f: (rates(f), gradients(f)), (self.rest,), (direction,))
-        return Acting(*value, *slope)
+        share = governed(1.0) - governed(0.0)
+
+        def slope(one):
+            along = jnp.zeros_like(share).at[:, 0].set(one)
+            return jax.jvp(self._gradients, (self.rest,), (along,))[1][:, 0]
+
+        return Advected(share, jnp.stack([slope(one) for one in share.T], axis=1))
 
     def affine(
         self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]
@@ -153,6 +179,19 @@ class ReferenceOperators(eqx.Module):
         """grad (r, u), affine in the fields where walls move."""
         found = self.along(fields - self.rest, self.coefficients.values(self.functional))
         return found.gradients + found.gradients_along
+
+    def _gradients(
+        self, fields: Float[Array, "points fields"]
+    ) -> Float[Array, "points fields dim"]:
+        """grad (r, u)."""
+        acting = (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects))
+        carrying = with_effects(self.functional, acting)
+        time = jnp.zeros((), fields.dtype)
+        _, _, sums = carrying.sums(time, self._state(fields), self.neighbors)
+        count, dim = self.points.shape
+        velocity = sums["carried_velocity"].reshape(count, dim, dim)
+        found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
+        return self.neighbors.unsort(found)
 
     @property
     def rest(self) -> Float[Array, "points fields"]:

@@ -2,6 +2,8 @@
 
 from .indicator import Indicator as Indicator
 from .indicator import velocity_error as velocity_error
+from .outputs import LinearOutput as LinearOutput
+from .outputs import fit_forces as fit_forces
 from .prediction import Prediction as Prediction
 from .recovery import Recovery as Recovery
 from .recovery import fit_recovery as fit_recovery

@@ -259,6 +259,7 @@ def draw_discrepancy(vortex, path):
             ("Galerkin, M = 10, Re 125", times, wild, 10 * wild),
         ],
         path,
+        [(0.3 * velocity, velocity), None, (0.02 * velocity, 0.1 * velocity)],
     )
 
 
@@ -359,6 +360,11 @@ def test_wrong_shapes_are_named(vortex, tmp_path):
         field_snapshots([("full", x, np.ones(4), np.ones(4))], path)
     with pytest.raises(ValueError, match=r"both must be \(S,\)"):
         discrepancy_history([("run", np.ones(3), np.ones(2), np.ones(3))], path)
+    run = ("run", np.ones(3), np.ones(3), np.ones(3))
+    with pytest.raises(ValueError, match="floors: got 2 for 1 histories"):
+        discrepancy_history([run], path, [None, None])
+    with pytest.raises(ValueError, match="floor of run"):
+        discrepancy_history([run], path, [(np.ones(3), np.ones(2))])
     with pytest.raises(ValueError, match=r"one value per probe"):
         wrong = dataclasses.replace(profile(100.0), coordinate=np.ones(3))
         centre_line_profiles([wrong], path)

@@ -1,0 +1,154 @@
+"""Drag, lift, wake length and Strouhal number of the scene `cylinder` beside the literature.
+
+    python -m benchmarks.cylinder_wake --reynolds 20 100 --resolutions 10 --widths 10
+
+Forces are means between snapshots of every stage of every step. Steady flows (Re 20, 40): drag and
+its deviation over the last quarter of the run, and the distance from the cylinder's back to where
+the mean velocity on the centre line turns. Shedding ones: over the second half, a sine with its
+frequency free is fitted to lift; the part of lift that it leaves is told. Literature is of a single
+cylinder in an unbounded stream, the scene's is one of a row, D / width of the stream: two widths
+show what that makes. Every finished run's row is in the JSON file at once; the same command goes
+on where it was cut short.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsph import SimulationError, run_scene
+from jaxsph.cli import positive_float, positive_int
+from jaxsph.environment import environment
+from jaxsph.interpolation import MovingLeastSquaresMap
+from jaxsph.scenes import cylinder
+from jaxsph.scenes.cylinder import DIAMETER, SPEED
+
+from .measure import format_rows, number, progress
+from .table import Table, command
+from .wake_runs import harmonic
+
+KEY = ("reynolds", "resolution", "width", "h_over_dx", "mach", "end_time")
+LITERATURE = {  # of a single cylinder
+    20: {"drag": (2.00, 2.05), "wake_length": (0.90, 0.94)},
+    40: {"drag": (1.50, 1.55), "wake_length": (2.1, 2.3)},
+    100: {"drag": (1.33, 1.37), "strouhal": (0.164, 0.166), "lift_amplitude": (0.32, 0.34)},
+    200: {"strouhal": (0.195, 0.197)},
+}
+SHEDS = 47.0  # the Reynolds number above which a wake sheds vortices
+END_TIME = {False: 40.0, True: 100.0}  # s, whether it does
+BEHIND = 4.0  # m of centre line that is looked at
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: a run failed, 2: bad input."""
+    return command("cylinder_wake", __doc__, _arguments, _run, argv)
+
+
+def _arguments(add) -> None:
+    add("--reynolds", type=positive_float, nargs="+", default=[20.0, 40.0, 100.0, 200.0],
+        metavar="RE", help="default: 20 40 100 200")  # fmt: skip
+    add("--resolutions", type=positive_int, nargs="+", default=[10], metavar="N",
+        help="particles a diameter (default: 10)")  # fmt: skip
+    add("--widths", type=positive_float, nargs="+", default=[10.0], metavar="W",
+        help="from cylinder to cylinder [m] (default: 10)")  # fmt: skip
+    add("--h-over-dx", type=positive_float, default=1.5, metavar="X", help="default: 1.5")
+    add("--mach", type=positive_float, default=0.1, metavar="M", help="default: 0.1")
+    add("--t-end", type=positive_float, metavar="T",
+        help="default: 40 s where the wake is steady, 100 s where it sheds")  # fmt: skip
+
+
+def _run(options) -> bool:
+    kept = Table(options.json, KEY, beside=lambda rows: {"literature": LITERATURE})
+    cases = []
+    for n, width, re in product(options.resolutions, options.widths, options.reynolds):
+        end = options.t_end or END_TIME[re > SHEDS]
+        values = (re, n, width, options.h_over_dx, options.mach, end)
+        cases.append(dict(zip(KEY, values, strict=True)))
+    for case in kept.left(cases):
+        kept.add(case | run(case))
+    print(_table(kept.rows))
+    return any(row["fault"] for row in kept.rows)
+
+
+def run(case: dict[str, Any]) -> dict[str, Any]:
+    """A run's coefficients, and what they took."""
+    reynolds, resolution = case["reynolds"], case["resolution"]
+    others = {name: case[name] for name in KEY[2:]}
+    scene = cylinder(resolution, reynolds, **others)
+    fault = None
+    with progress(f"Re {reynolds:g}, {resolution} a diameter", scene.steps) as report:
+        try:
+            trajectory = run_scene(scene, progress=report)
+        except SimulationError as error:
+            fault, trajectory = str(error), error.trajectory
+    row = {
+        "particles": trajectory.particles,
+        "steps": scene.steps,
+        "seconds": trajectory.timing.run_seconds,
+        "compile_seconds": trajectory.timing.compile_seconds,
+        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
+        "fault": fault,
+        "environment": environment(),
+    }
+    if fault:
+        return row
+    coefficients = 2.0 * trajectory.mean_forces["cylinder"] / (SPEED**2 * DIAMETER)
+    measured = shedding if reynolds > SHEDS else steady
+    return row | measured(scene, trajectory, coefficients)
+
+
+def shedding(scene, trajectory, coefficients) -> dict[str, float]:
+    """Means and the first harmonic of lift over the second half of the run."""
+    late = trajectory.time > 0.5 * trajectory.time[-1]
+    found = harmonic(trajectory.time[late], *coefficients[late].T)
+    return {name: value for name, value in found.items() if name != "phase"}
+
+
+def steady(scene, trajectory, coefficients) -> dict[str, float]:
+    """Means over the last quarter of the run."""
+    late = trajectory.time > 0.75 * trajectory.time[-1]
+    drag, lift = coefficients[late].T
+    return {
+        "drag": float(drag.mean()),
+        "drag_deviation": float(drag.std()),
+        "lift_mean": float(lift.mean()),
+        "wake_length": wake_length(scene, trajectory, late) / DIAMETER,
+    }
+
+
+def wake_length(scene, trajectory, late) -> float:
+    """From the cylinder's back to where the mean velocity on the centre line turns [m]."""
+    apart = np.linspace(0.1, BEHIND, 200)
+    back = scene.parameters["upstream"] + 0.5 * DIAMETER
+    points = np.stack([back + apart, 0.0 * apart], axis=1)
+    there = eqx.filter_jit(MovingLeastSquaresMap.allocate(jnp.asarray(points), scene.space))
+    along = []
+    for k in np.flatnonzero(late):
+        values, overflow = there(
+            jnp.asarray(trajectory.position[k]), jnp.asarray(trajectory.velocity[k][:, :1])
+        )
+        along.append(np.full(len(apart), np.nan) if overflow else np.asarray(values)[:, 0])
+    mean = np.mean(along, axis=0)
+    turns = np.flatnonzero((mean[:-1] < 0.0) & (mean[1:] >= 0.0))
+    if not len(turns):
+        return float("nan")
+    k = turns[-1]
+    return float(apart[k] + (apart[k + 1] - apart[k]) * mean[k] / (mean[k] - mean[k + 1]))
+
+
+def _table(rows) -> str:
+    head = ("Re", "a diameter", "width", "drag", "lift", "Strouhal", "wake", "seconds")
+    names = ("drag", "lift_amplitude", "strouhal", "wake_length", "seconds")
+    found = [
+        (number(r["reynolds"]), str(r["resolution"]), number(r["width"]),
+         *(number(r.get(name), 4) for name in names)) for r in rows
+    ]  # fmt: skip
+    return format_rows(head, found)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,179 @@
+"""Reduced models of a cylinder's wake: frequency, drag, lift and phase at unseen Reynolds numbers.
+
+    python -m benchmarks.wake_models --modes 8 14 20
+
+A model on points of runs of the developed wake at three Reynolds numbers, tensors without a
+closure unless one is asked for. At unseen numbers it starts where the full run starts and is
+followed for as long as that; drag and lift are outputs learnt on the training runs (`fit_forces`).
+Both runs' lift is a sine over their second half: Strouhal numbers and amplitudes are those of it,
+the phase is that at its end. Beside them the error of the velocity over all points and times, its
+floor, and the time. Runs are kept in a folder, results as they come: the same command goes on where
+it was cut short.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxsph_rom
+from jaxsph.cli import positive_float, positive_int
+from jaxsph.environment import environment
+from jaxsph.scenes.cylinder import DIAMETER, SPEED
+from jaxsph_rom.points import fit_forces, mapped_run, train_each
+
+from .measure import format_rows, number, progress
+from .table import Table, command
+from .wake_runs import WakeRuns, harmonic
+
+KEY = ("resolution", "trained_on", "modes", "closure", "reynolds", "seconds_of_flow")
+UNSEEN = {95.0: 18.0, 125.0: 60.0}  # Reynolds number: s of flow
+_DIFFERENCE = 1e-3  # of the Reynolds number
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit code 0: good, 1: a prediction is lost, 2: bad input."""
+    return command("wake_models", __doc__, _arguments, _run, argv)
+
+
+def _arguments(add) -> None:
+    add("--resolution", type=positive_int, default=10, metavar="N",
+        help="particles a diameter (default: 10)")  # fmt: skip
+    add("--train", type=positive_float, nargs="+", default=[80.0, 110.0, 140.0], metavar="RE",
+        help="default: 80 110 140")  # fmt: skip
+    add("--modes", type=positive_int, nargs="+", default=[8, 14, 20], metavar="M",
+        help="default: 8 14 20")  # fmt: skip
+    add("--closure", choices=("none", "linear"), default="none", help="default: none")
+    add("--out", type=Path, default=Path("out/wake"), metavar="DIR",
+        help="where runs are kept (default: %(default)s)")  # fmt: skip
+
+
+def _run(options) -> bool:
+    kept = Table(options.json, KEY, beside=lambda rows: {"environment": environment()})
+    shared = (options.resolution, "-".join(f"{r:g}" for r in options.train))
+    cases = [
+        dict(zip(KEY, (*shared, modes, options.closure, *unseen), strict=True))
+        for modes in options.modes
+        for unseen in UNSEEN.items()
+    ]
+    left = list(kept.left(cases))
+    if left:
+        runs = WakeRuns(options.out, options.resolution)
+        models = _models(runs, options, sorted({case["modes"] for case in left}))
+        for modes, (model, drag) in models:
+            for case in (case for case in left if case["modes"] == modes):
+                kept.add(case | judge(model, drag, runs, case))
+    print(_table(kept.rows))
+    return any(row["fault"] for row in kept.rows)
+
+
+def _models(runs: WakeRuns, options, sizes):
+    trained = {reynolds: runs.run(reynolds) for reynolds in options.train}
+
+    def make(reynolds):
+        known = trained.get(float(reynolds))
+        return runs.scene(reynolds, runs.recorded) if known is None else known[0]
+
+    closure = jaxsph_rom.LinearClosure() if options.closure == "linear" else None
+    points = [{"reynolds": reynolds} for reynolds in options.train]
+    full = [run for _, run in trained.values()]
+    models = train_each(
+        jaxsph_rom.Family(make, starts=False), points, sizes, runs=full, closure=closure,
+        progress=progress,
+    )  # fmt: skip
+    for model in models:
+        yield model.flow.basis.size, (model, fit_forces(model, full, "cylinder"))
+
+
+def judge(model, forces, runs: WakeRuns, case: dict[str, Any]) -> dict[str, Any]:
+    """A prediction at an unseen number beside the full run."""
+    reynolds, seconds = case["reynolds"], case["seconds_of_flow"]
+    scene, full = runs.run(reynolds, seconds)
+    reduced = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
+    row = {
+        "fault": None if reduced.status[0] == 0 else f"lost at {reduced.time[reduced.step[0]]:g} s",
+        "expected_error_percent": 100.0 * float(reduced.error_indicator[0]),
+        "full_seconds": full.timing.seconds(scene.steps),
+        "particles": full.particles,
+    }
+    if row["fault"]:
+        return row
+    theirs = 2.0 * full.mean_forces["cylinder"] / (SPEED**2 * DIAMETER)
+    values = jnp.asarray(reduced.values[0])
+    mine = 2.0 * np.asarray(forces(jnp.asarray(reduced.coordinates[0]), values))
+    mine /= SPEED**2 * DIAMETER
+    mine[1:] = 0.5 * (mine[1:] + mine[:-1])  # means between snapshots, as theirs are
+    late = full.time > 0.5 * full.time[-1]
+    wave, true = (harmonic(full.time[late], *each[late].T) for each in (mine, theirs))
+    flow = model.flow
+    fields = np.moveaxis(mapped_run(flow.reference, full, flow.fluid), -1, 0)
+    modes, centre = (np.asarray(part) for part in (flow.basis.modes, flow.basis.centre))
+    own = np.asarray(flow.project(jnp.asarray(np.moveaxis(fields, 0, -1))))
+    found, best = (
+        centre[None] + np.einsum("gfm,tm->tgf", modes, np.asarray(a))
+        for a in (reduced.coordinates[0], own)
+    )
+    largest = np.linalg.norm(fields[:, :, 1:], axis=(1, 2)).max()
+    off, floor = (
+        100.0 * np.linalg.norm((each - fields)[:, :, 1:], axis=(1, 2)).max() / largest
+        for each in (found, best)
+    )
+    again = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
+    apart = (wave["phase"] - true["phase"]) / (2.0 * np.pi)
+    periods = true["strouhal"] * seconds
+    return row | {
+        "strouhal": wave["strouhal"],
+        "strouhal_full": true["strouhal"],
+        "strouhal_error_percent": 100.0 * abs(wave["strouhal"] / true["strouhal"] - 1.0),
+        "drag": wave["drag"],
+        "drag_full": true["drag"],
+        "drag_error_percent": 100.0 * abs(wave["drag"] / true["drag"] - 1.0),
+        "lift_amplitude": wave["lift_amplitude"],
+        "lift_amplitude_full": true["lift_amplitude"],
+        "lift_error_percent": 100.0 * abs(wave["lift_amplitude"] / true["lift_amplitude"] - 1.0),
+        "periods": periods,
+        "phase_error_percent_of_a_period": 100.0 * abs((apart + 0.5) % 1.0 - 0.5),
+        "velocity_error_percent": off,
+        "velocity_floor_percent": floor,
+        "reduced_seconds": again.run_seconds,
+        "times_faster": row["full_seconds"] / again.run_seconds,
+        **_gradient(model, forces, scene, reynolds, full.time),
+    }
+
+
+def _gradient(model, forces, scene, reynolds: float, times) -> dict[str, float]:
+    """d(mean drag)/d(Re) by reverse mode, and by central differences."""
+
+    @jax.jit
+    def drag(number):
+        found = model.predict({"reynolds": number}, start=scene, times=times)
+        return jnp.mean(forces(found.coordinates[0], found.values[0])[:, 0])
+
+    number, step = jnp.asarray(reynolds), _DIFFERENCE * reynolds
+    before = clock.perf_counter()
+    slope = float(jax.grad(drag)(number))
+    by_difference = float((drag(number + step) - drag(number - step)) / (2.0 * step))
+    return {
+        "drag_slope": slope,
+        "drag_slope_off": abs(slope / by_difference - 1.0),
+        "slope_seconds_with_compilation": clock.perf_counter() - before,
+    }
+
+
+def _table(rows) -> str:
+    head = ("M", "Re", "periods", "Strouhal %", "drag %", "lift %", "phase %", "velocity %",
+            "floor %", "faster")  # fmt: skip
+    names = ("modes", "reynolds", "periods", "strouhal_error_percent", "drag_error_percent",
+             "lift_error_percent", "phase_error_percent_of_a_period", "velocity_error_percent",
+             "velocity_floor_percent", "times_faster")  # fmt: skip
+    found = [[number(row.get(name)) for name in names] for row in rows]
+    return format_rows(head, found)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

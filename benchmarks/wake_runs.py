@@ -1,0 +1,97 @@
+"""Full runs of a cylinder's wake, made once and kept, and what its lift is."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from jaxsph import Trajectory, run_scene
+from jaxsph.scenes import Scene, continued, cylinder
+from jaxsph.scenes.cylinder import DIAMETER, SPEED
+from jaxsph_rom.study import with_record
+
+DOMAIN = {"width": 6.0, "upstream": 4.0, "downstream": 6.0}  # m
+STEP, EACH = 1.5e-2, 20  # s, steps to a snapshot, for 10 particles a diameter
+
+
+class WakeRuns:
+    """Runs at any Reynolds number, on from the developed wake at the first one.
+
+    Args:
+        folder: where they are kept; what was cut short goes on from there.
+        resolution: particles a diameter.
+        first: Reynolds number of the run from the start.
+        developed: how long that takes to shed regularly [s].
+        adapted: how long a run at another number takes until it is recorded [s].
+        recorded: and how long it is then [s].
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        resolution: int,
+        first: float = 100.0,
+        developed: float = 60.0,
+        adapted: float = 18.0,
+        recorded: float = 18.0,
+    ):
+        self.folder, self.resolution, self.first = folder, resolution, first
+        self.developed, self.adapted, self.recorded = developed, adapted, recorded
+        self.run = cache(self._run)
+
+    def scene(self, reynolds: float, end_time: float) -> Scene:
+        """The scene from its uniform start."""
+        step = STEP * 10 / self.resolution
+        each = round(EACH * self.resolution / 10)
+        steps = each * round(end_time / (each * step))
+        scene = cylinder(self.resolution, reynolds, time_step=step, end_time=steps * step, **DOMAIN)
+        return dataclasses.replace(scene, steps_per_snapshot=each)
+
+    def _from_start(self) -> tuple[Scene, Trajectory]:
+        scene = self.scene(self.first, self.developed)
+        return scene, self._kept("start", scene)
+
+    def after(self, before: Scene, state, scene: Scene, how: str) -> Scene:
+        """A scene that goes on from a state of another."""
+        return with_record(continued(scene, state, before.space), before=how)
+
+    def _run(self, reynolds: float, recorded: float | None = None) -> tuple[Scene, Trajectory]:
+        """The scene of what is recorded, and its run."""
+        start, developed = self._from_start()
+        adapting = self.after(
+            start, developed.state(-1), self.scene(reynolds, self.adapted), "developed"
+        )
+        adapted = self._kept(f"adapt-{reynolds:g}", adapting)
+        seconds = self.recorded if recorded is None else recorded
+        scene = self.after(adapting, adapted.state(-1), self.scene(reynolds, seconds), "adapted")
+        return scene, self._kept(f"record-{reynolds:g}", scene)
+
+    def _kept(self, name: str, scene: Scene) -> Trajectory:
+        return run_scene(scene, path=self.folder / f"{name}.h5", progress=True)
+
+
+def harmonic(time, drag, lift) -> dict[str, float]:
+    """Mean drag, and the sine that lift is, with its phase at the end [rad]."""
+
+    def sine(t, mean, along, across, frequency):
+        angle = 2.0 * np.pi * frequency * t
+        return mean + along * np.sin(angle) + across * np.cos(angle)
+
+    step = time[1] - time[0]
+    powers = np.abs(np.fft.rfft(lift - lift.mean()))
+    first = np.fft.rfftfreq(len(lift), step)[1 + powers[1:].argmax()]
+    found, _ = curve_fit(sine, time, lift, (lift.mean(), lift.std(), lift.std(), first))
+    mean, along, across, frequency = found
+    return {
+        "drag": float(drag.mean()),
+        "lift_mean": float(mean),
+        "lift_amplitude": float(np.hypot(along, across)),
+        "lift_left_rms": float(np.std(lift - sine(time, *found))),
+        "strouhal": float(abs(frequency) * DIAMETER / SPEED),
+        "phase": float(np.arctan2(across, along) + 2.0 * np.pi * frequency * time[-1]),
+        "periods": float(abs(frequency) * (time[-1] - time[0])),
+    }

@@ -1,0 +1,60 @@
+"""Tables of a cylinder's wake: the full model beside the literature, reduced models beside it."""
+
+from __future__ import annotations
+
+from .table_text import markdown, results, short
+
+
+def cylinder_wake() -> str:
+    """Coefficients by Reynolds number, resolution and width of the stream."""
+    header = ("Re", "particles a diameter", "cylinders apart [D]", "drag", "lift amplitude",
+              "Strouhal", "wake [D]", "steps", "run [s]")  # fmt: skip
+    rows = [
+        (
+            short(row["reynolds"], 3),
+            str(row["resolution"]),
+            f"{row['width']:g}",
+            short(row["drag"], 3),
+            *(
+                short(row[name], 3) if name in row else ""
+                for name in ("lift_amplitude", "strouhal", "wake_length")
+            ),
+            str(row["steps"]),
+            f"{row['seconds']:.0f}",
+        )
+        for row in sorted(
+            results("cylinder_wake"),
+            key=lambda row: (row["reynolds"], row["width"], row["resolution"]),
+        )
+        if row["fault"] is None
+    ]
+    return markdown(header, rows)
+
+
+def wake_models() -> str:
+    """Reduced models at Reynolds numbers that they have not seen."""
+    header = ("M", "closure", "Re", "periods", "Strouhal off by %", "drag %", "lift %",
+              "phase at the end, % of a period", "velocity %", "floor %", "full, reduced [s]",
+              "times faster")  # fmt: skip
+    names = ("strouhal_error_percent", "drag_error_percent", "lift_error_percent",
+             "phase_error_percent_of_a_period", "velocity_error_percent")  # fmt: skip
+    rows = [
+        (
+            str(row["modes"]),
+            row["closure"],
+            short(row["reynolds"], 3),
+            *(
+                (row["fault"], *[""] * 8)
+                if row["fault"]
+                else (
+                    short(row["periods"]),
+                    *(short(row[name]) for name in names),
+                    short(row["velocity_floor_percent"]),
+                    f"{row['full_seconds']:.0f}, {short(row['reduced_seconds'])}",
+                    f"{row['times_faster']:.0f}",
+                )
+            ),
+        )
+        for row in results("wake_models")
+    ]
+    return markdown(header, rows)

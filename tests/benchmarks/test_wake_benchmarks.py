@@ -1,0 +1,37 @@
+"""What is told of a cylinder's wake."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks import cylinder_wake
+from benchmarks.wake_runs import harmonic
+
+
+def test_lift_is_taken_for_the_sine_that_it_is():
+    time = np.arange(0.3, 40.0, 0.3)
+    angle = 2.0 * np.pi * 0.173 * time + 0.4
+    drag = 1.4 + 0.01 * np.sin(2.0 * angle)
+    noise = 0.05 * np.random.default_rng(0).normal(size=len(time))
+    found = harmonic(time, drag, 0.02 + 0.33 * np.sin(angle) + noise)
+    assert found["strouhal"] == pytest.approx(0.173, rel=2e-3)
+    assert found["lift_amplitude"] == pytest.approx(0.33, rel=0.05)
+    assert found["drag"] == pytest.approx(1.4, rel=2e-3)
+    assert found["lift_left_rms"] == pytest.approx(0.05, rel=0.2)
+    turned = (found["phase"] - angle[-1] + np.pi) % (2.0 * np.pi) - np.pi
+    assert abs(turned) < 0.1
+
+
+@pytest.mark.slow
+def test_a_short_run_is_judged_and_kept(tmp_path):
+    file = tmp_path / "wake.json"
+    command = ["--reynolds", "20", "60", "--widths", "2.5", "--t-end", "0.6", "--json", str(file)]
+    assert cylinder_wake.main(command) == 0
+    steady, shedding = json.loads(file.read_text())["rows"]
+    assert steady["drag"] > 1.0 and "wake_length" in steady
+    assert shedding["drag"] > 1.0 and "strouhal" in shedding
+    written = file.stat().st_mtime_ns
+    assert cylinder_wake.main(command) == 0  # nothing is left to run
+    assert json.loads(file.read_text())["rows"] == [steady, shedding]
+    assert written <= file.stat().st_mtime_ns
