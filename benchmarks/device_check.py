@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 import time as clock
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import jax
@@ -220,6 +220,7 @@ def timed(function: Callable, *arguments) -> tuple[Any, float, float]:
     return found, min(seconds[1:]), seconds[0]
 
 
+@cache
 def bandwidth(count: int = 2**26) -> float:
     """Bytes a second of a copy, read and written, of 256 MiB on a GPU."""
     count = count if jax.default_backend() != "cpu" else 2**20

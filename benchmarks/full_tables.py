@@ -194,6 +194,31 @@ def versions() -> str:
     )
 
 
+def ahead_of_time() -> str:
+    """Programs for a GPU, with pair sums in chunks and in a kernel of their own."""
+    rows = results("ahead_of_time")
+    cases = dict.fromkeys((r["dim"], r["particles"], r["program"]) for r in rows)
+
+    def lines() -> Iterator[tuple[str, ...]]:
+        for dim, particles, program in cases:
+            case = {"dim": dim, "particles": particles, "program": program}
+            before, now = (
+                next(r for r in rows if case.items() <= r.items() and r["lowering"] == lowering)
+                for lowering in ("chunks", "tiles")
+            )
+            yield (
+                f"{particles:,} in {dim}D: {program}",
+                f"{before['operations']:,}",
+                f"{now['operations']:,}",
+                short(now["temporary_bytes"] / 1e9),
+                str(now["registers"]),
+                str(now["spilled_bytes"]),
+            )
+
+    header = ("", "operations in chunks", "now", "temporary [GB]", "registers", "spilled [bytes]")
+    return markdown(header, lines())
+
+
 def _error(row: Row) -> str:
     if row["fault"]:
         return f"lost at {short(row['reached'])} s"

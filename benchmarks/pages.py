@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable
 
 from .full_tables import (
+    ahead_of_time,
     cavity_of_pysph,
     free_flows,
     schemes,
@@ -68,6 +69,7 @@ TABLES: dict[str, Callable[[], str]] = {
         predicted_cavity,
         particle_step,
         versions,
+        ahead_of_time,
         cheapest_settings,
         label_models,
         label_galerkin,
