@@ -99,6 +99,9 @@ class SPHFunctional(eqx.Module):
                     rates[name] = rates[name] + rate
         for effect in self.effects:
             rates = effect.governed(context, fields, rates)
+        for effect in self.effects:
+            for name, rate in effect.transported(context, fields, sums).items():
+                rates[name] = rates[name] + rate
         return jax.tree.map(neighbors.unsort, ParticleState(**rates))
 
     def context(

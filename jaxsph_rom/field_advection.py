@@ -55,7 +55,7 @@ class FieldAdvection(Effect):
             PairTerm("momentum_flux", velocity, momentum_flux, momentum),
         )
 
-    def rates(self, context, fields, sums):
+    def transported(self, context, fields, sums):
         divergence = sums["velocity_divergence"]
         return {
             "density": fields["density"] * divergence - sums["mass_flux"],

@@ -116,6 +116,10 @@ class Effect(eqx.Module):
         """The rates that all effects together give, as this one leaves them."""
         return rates
 
+    def transported(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
+        """Contributions that no effect governs: of a change of frame, as to points that stay."""
+        return {}
+
     def on_walls(self, context: Context, fields: dict, surface: WallSurface) -> Loads | None:
         """What of the force on each part of the walls is in no sum over ghosts, if anything is."""
         return None

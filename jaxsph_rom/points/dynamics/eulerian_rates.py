@@ -27,7 +27,7 @@ class EulerianRates(eqx.Module):
         du/dt = f_u - u . grad u,    dr/dt = (rho0 / rho) (f_rho - u . grad rho),
 
     with f the SPH functional, time and particle volumes m / rho included. Nothing is linearised:
-    any equation of state, any force, walls as the full model has them.
+    any equation of state, any force, walls as the full model has them, and a fringe governs f_u.
 
     Args:
         functional: effects that act on fixed points, and `FieldAdvection`.

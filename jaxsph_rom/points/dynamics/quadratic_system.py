@@ -163,7 +163,6 @@ def projected(
     middle = np.asarray(opened.middle, float)
     functions = np.concatenate([(centre - rest)[:, :, None], modes], axis=2).astype(dtype)
     units = np.eye(len(middle))
-    advected = operators.advected()
     # steps that do not vanish beside the rest: what is a polynomial has no other error than that
     steps = [max(1.0, abs(float(m))) for m in middle]
 
@@ -174,7 +173,7 @@ def projected(
         values = jnp.asarray(values, dtype)
         found = [operators.along(functions[:, :, k], values) for k in range(functions.shape[2])]
         along = (np.stack(part, axis=-1) for part in zip(*(f[2:] for f in found), strict=True))
-        tested = _tested(functions, weights, form, advected, *found[0][:2], *along)
+        tested = _tested(functions, weights, form, *found[0][:2], *along)
         return [np.asarray(part, float) for part in tested]
 
     *whole, quadratic = at()
@@ -224,7 +223,7 @@ def _about_zero(value, slopes, bends, middle, powers):
 
 @eqx.filter_jit
 @full_precision
-def _tested(functions, weights, form, advected, rates, gradients, rates_along, gradients_along):
+def _tested(functions, weights, form, rates, gradients, rates_along, gradients_along):
     """Constant, linear and quadratic part, of what acts at rest and along each function."""
     weighted = functions * weights[None, :, None]
 
@@ -234,28 +233,12 @@ def _tested(functions, weights, form, advected, rates, gradients, rates_along, g
     velocity = jnp.moveaxis(functions[:, 1:], 2, 0)
 
     def carried(gradient):  # tested, by each velocity in turn
-        def by(one):
-            along = jnp.einsum("gd,gfd...->gf...", one, gradient)
-            if advected is not None:
-                along = jnp.einsum("gf,gf...->gf...", advected.share, along)
-            return -tested(along)
-
-        return lax.map(by, velocity)
+        return lax.map(lambda one: -tested(jnp.einsum("gd,gfd...->gf...", one, gradient)), velocity)
 
     plain = tested(rates + rates_along[:, :, 0])[1:]
     plain_slopes = tested(rates_along[:, :, 1:])[1:]
     by_walls = carried(gradients)[:, 1:]  # [i, k]: moving walls' part, by mode i
-    advection = carried(gradients_along)  # [i, k, j]: function j carried by function i
-    if advected is None:
-        advection = form(advection)
-    else:  # a form that takes out (div u) w / 2 would take (u . grad s) w / 2 with it
-
-        def by_share(one):
-            along = jnp.einsum("gd,gfd->gf", one, advected.gradient)
-            return 0.5 * tested(along[:, :, None] * functions)
-
-        held = lax.map(by_share, velocity)
-        advection = form(advection - held) + held
+    advection = form(carried(gradients_along))  # [i, k, j]: function j carried by function i
     by_centre, of_centre, by_modes = advection[0, 1:], advection[1:, 1:, 0], advection[1:, 1:, 1:]
     constant = plain + by_centre[:, 0] + by_walls[0]
     linear = plain_slopes + by_centre[:, 1:] + (of_centre + by_walls[1:]).T

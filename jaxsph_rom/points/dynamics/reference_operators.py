@@ -51,14 +51,6 @@ class Acting(NamedTuple):
     gradients_along: Float[Array, "points fields dim"]
 
 
-class Advected(NamedTuple):
-    """How much of its advection each field keeps, and the gradient of that: less than all where an
-    effect governs the rates of all others, as a fringe does."""
-
-    share: Float[Array, "points fields"]
-    gradient: Float[Array, "points fields dim"]
-
-
 class ReferenceOperators(eqx.Module):
     """The SPH equations of a scene at fixed points x_G of constant volume V_0 = dx^n.
 
@@ -141,32 +133,6 @@ class ReferenceOperators(eqx.Module):
 
         value, slope = jax.jvp(acting, (self.rest,), (direction,))
         return Acting(*value, *slope)
-
-    def advected(self) -> Advected | None:
-        """What of the advection of (r, u) is left where effects govern the rates of all others;
-        none if that is all of it everywhere."""
-        found = self._advected()
-        return None if bool(jnp.all(found.share == 1.0)) else found
-
-    @eqx.filter_jit
-    def _advected(self) -> Advected:
-        time = jnp.zeros((), self.points.dtype)
-        context, fields, _ = self.functional.sums(time, self._state(self.rest), self.neighbors)
-
-        def governed(value):
-            rates = {n: jnp.full_like(fields[n], value) for n in ("density", "velocity")}
-            for effect in self.functional.effects:
-                rates = effect.governed(context, fields, rates)
-            found = jnp.concatenate([rates["density"][:, None], rates["velocity"]], axis=1)
-            return self.neighbors.unsort(found)
-
-        share = governed(1.0) - governed(0.0)
-
-        def slope(one):
-            along = jnp.zeros_like(share).at[:, 0].set(one)
-            return jax.jvp(self._gradients, (self.rest,), (along,))[1][:, 0]
-
-        return Advected(share, jnp.stack([slope(one) for one in share.T], axis=1))
 
     def affine(
         self, fields: Float[Array, "points fields"], values: Float[Array, " coefficients"]

@@ -1,5 +1,6 @@
 """Rates at fixed points: what they are, and that a few of them need only what is around them."""
 
+import dataclasses
 from functools import cache
 
 import equinox as eqx
@@ -7,9 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxsph import ParticleState
 from jaxsph.arrangements import Lattice
-from jaxsph.scenes import lid_driven_cavity, open_cavity, taylor_green
+from jaxsph.ramps import ramp
+from jaxsph.scenes import lid_driven_cavity, open_cavity, poiseuille_open, taylor_green
 from jaxsph_rom.points import EulerianRates, ReferenceOperators, to_log_density
+from jaxsph_rom.points.dynamics.fixed_points import on_points
+from jaxsph_rom.points.dynamics.point_lists import neighbors_at
 
 SCENES = {
     "periodic": lambda: taylor_green(24, 100.0, arrangement=Lattice()),
@@ -79,3 +84,28 @@ def test_samples_that_are_no_points_are_named():
     for wrong, match in (([], "at least one"), ([3, 3], "each once"), ([576], "0 to 575")):
         with pytest.raises(ValueError, match=match):
             rates.around(wrong)
+
+
+def test_a_fringe_governs_what_particles_feel_and_no_advection():
+    """With it less without it: s (pull - f), f without the advection of fields."""
+    scene = poiseuille_open(8, h_over_dx=1.5, arrangement=Lattice())
+    *others, fringe = scene.effects
+    points, time = scene.state.position, jnp.zeros(())
+    x, y = points.T
+    velocity = jnp.stack([1.0 + 0.2 * jnp.sin(3.0 * x), 0.1 * jnp.sin(2.0 * y + x)], axis=1)
+    density = jnp.full((len(x), 1), scene.fluid.reference_density)
+    fields = jnp.concatenate([density, velocity], axis=1)
+    free = dataclasses.replace(scene, effects=tuple(others), solution=None)
+    with_it, without = (
+        rates(time, fields, rates.coefficients.values(rates.functional))
+        for rates in (EulerianRates.of_scene(s, points) for s in (scene, free))
+    )
+    functional = on_points(free)
+    state = ParticleState(points, velocity, density[:, 0])
+    felt = functional(time, state, neighbors_at(functional, points)).velocity
+    share = ramp((x - fringe.start) / (fringe.end - fringe.start), 0.0, 0.5)[:, None]
+    pull = -fringe.rate * (velocity - fringe.profile(points, time))
+    assert float(share.max()) == 1.0
+    found = (with_it - without)[:, 1:]
+    np.testing.assert_allclose(found, share * (pull - felt), atol=1e-10)
+    np.testing.assert_array_equal(with_it[:, 0], without[:, 0])

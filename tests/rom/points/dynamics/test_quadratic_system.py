@@ -12,7 +12,6 @@ from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import IsotropicViscosity, Varying
 from jaxsph.integrate import integrate
-from jaxsph.ramps import ramp
 from jaxsph.scenes import couette, lid_driven_cavity, open_cavity, poiseuille_open, taylor_green
 from jaxsph.scenes import taylor_green_solution as exact
 from jaxsph.schemes import DeltaPlus
@@ -51,7 +50,12 @@ def cavity():
     return lid_driven_cavity(16, 100.0)
 
 
-@pytest.mark.parametrize("name", ["vortex", "cavity"])
+@pytest.fixture(scope="module")
+def channel():
+    return poiseuille_open(8, h_over_dx=1.5, arrangement=Lattice())
+
+
+@pytest.mark.parametrize("name", ["vortex", "cavity", "channel"])
 def test_tensors_are_the_projected_operators(name, request):
     scene = request.getfixturevalue(name)
     basis, points = random_basis(scene), scene.state.position
@@ -67,49 +71,12 @@ def test_tensors_are_the_projected_operators(name, request):
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
 
 
-def test_tensors_of_a_channel_carry_less_in_its_fringe():
-    scene = poiseuille_open(8, h_over_dx=1.5, arrangement=Lattice())
-    points, basis, fringe = scene.state.position, random_basis(scene), scene.effects[-1]
-    share = np.ones((len(points), 3))
-    along = (np.asarray(points)[:, :1] - fringe.start) / (fringe.end - fringe.start)
-    share[:, 1:] -= np.asarray(ramp(jnp.asarray(along), 0.0, 0.5))
-    operators = ReferenceOperators.of_scene(scene, points)
-    a = np.random.default_rng(1).normal(size=basis.size)
-    fields, viscosity = jnp.asarray(basis.centre + basis.modes @ a), jnp.asarray(0.1)
-    carried = jnp.einsum("gd,gfd->gf", fields[:, 1:], operators.gradients(fields))
-    rates = operators.affine(fields, viscosity) - share * carried
-    wanted = np.einsum("gfm,f,gf->m", basis.modes, basis.weights, rates)
-    found = galerkin_system(scene, basis, points, advective)(jnp.asarray(a), viscosity)
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
-
-
-def test_skew_symmetry_leaves_what_a_fringe_takes_of_advection():
-    """<v, s u . grad w> of a u without divergence, by parts: it is not skew-symmetric."""
-    scene = poiseuille_open(24, h_over_dx=1.5, arrangement=Lattice())
-    x, y = np.asarray(scene.state.position).T
-    wave = 2.0 * np.pi / scene.space.box.lengths[0]
-    phase = wave * (x - scene.effects[-1].start)
-    modes = np.zeros((len(x), 3, 2))
-    modes[:, 1, 0] = np.sin(np.pi * y) ** 2
-    modes[:, 1, 1] = np.cos(phase) * np.sin(2.0 * np.pi * y)
-    modes[:, 2, 1] = wave * np.sin(phase) * (1.0 - np.cos(2.0 * np.pi * y)) / (2.0 * np.pi)
-    centre = np.zeros((len(x), 3))
-    centre[:, 0] = float(scene.fluid.reference_density)
-    basis = Basis(modes, centre, np.ones(3), np.ones(2))
-    forms = (skew_symmetric, advective)
-    skew, plain = (
-        galerkin_system(scene, basis, scene.state.position, form).quadratic for form in forms
-    )
-    assert float(jnp.abs(skew - plain).max()) < 0.02 * float(jnp.abs(plain).max())
-
-
-def test_an_inflow_that_changes_is_not_for_tensors():
-    scene = poiseuille_open(8, h_over_dx=1.5, arrangement=Lattice())
-    *others, fringe = scene.effects
+def test_an_inflow_that_changes_is_not_for_tensors(channel):
+    *others, fringe = channel.effects
     fringe = dataclasses.replace(fringe, profile=Varying(fringe.profile, jnp.cos))
     with pytest.raises(ValueError, match="Fringe changes with time"):
         ReferenceOperators.of_scene(
-            dataclasses.replace(scene, effects=(*others, fringe)), scene.state.position
+            dataclasses.replace(channel, effects=(*others, fringe)), channel.state.position
         )
 
 
