@@ -140,7 +140,9 @@ def test_shifting_does_not_cross_the_surface():
     along = np.asarray(rates.position)[top][:, 0]
     assert np.abs(along).max() > 1e-3
     inside = np.asarray(fields["interior"]) == 1.0
-    np.testing.assert_allclose(rates.position[inside], raw["shift_velocity"][inside], rtol=1e-12)
+    found, wanted = (np.asarray(a)[inside] for a in (rates.position, raw["shift_velocity"]))
+    # of the largest: two programs add up in another order, and some components are near zero
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13 * np.abs(wanted).max())
 
 
 def test_the_density_of_a_hydrostatic_column_is_not_diffused_at_its_surface():
