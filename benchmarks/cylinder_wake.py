@@ -40,6 +40,7 @@ LITERATURE = {  # of a single cylinder
 }
 SHEDS = 47.0  # the Reynolds number above which a wake sheds vortices
 END_TIME = {False: 40.0, True: 100.0}  # s, whether it does
+SHORTEST = 6.0  # s: a period of lift in half of it, at some ten snapshots
 BEHIND = 4.0  # m of centre line that is looked at
 
 
@@ -66,6 +67,8 @@ def _run(options) -> bool:
     cases = []
     for n, width, re in product(options.resolutions, options.widths, options.reynolds):
         end = options.t_end or END_TIME[re > SHEDS]
+        if re > SHEDS and end < SHORTEST:
+            raise ValueError(f"--t-end: at least {SHORTEST:g} s, or lift cannot be seen to swing.")
         values = (re, n, width, options.h_over_dx, options.mach, end)
         cases.append(dict(zip(KEY, values, strict=True)))
     for case in kept.left(cases):
