@@ -55,6 +55,9 @@ def wake_models() -> str:
                 )
             ),
         )
-        for row in results("wake_models")
+        for row in sorted(
+            results("wake_models"),
+            key=lambda row: (row["closure"] != "none", row["modes"], row["reynolds"]),
+        )
     ]
     return markdown(header, rows)
