@@ -68,7 +68,7 @@ class WakeRuns:
         adapted = self._kept(f"adapt-{reynolds:g}", adapting)
         seconds = self.recorded if recorded is None else recorded
         scene = self.after(adapting, adapted.state(-1), self.scene(reynolds, seconds), "adapted")
-        return scene, self._kept(f"record-{reynolds:g}", scene)
+        return scene, self._kept(f"record-{reynolds:g}-{seconds:g}s", scene)
 
     def _kept(self, name: str, scene: Scene) -> Trajectory:
         return run_scene(scene, path=self.folder / f"{name}.h5", progress=True)

@@ -77,13 +77,13 @@ def cylinder(
     scale_of = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
     for name, value in {"upstream": upstream, "downstream": downstream, "width": width}.items():
         least = DIAMETER if name != "width" else 2.0 * DIAMETER
-        if not least <= value:
-            raise ValueError(f"{name}: at least {least:g} m, got {value:g}.")
+        if not least <= value < np.inf:
+            raise ValueError(f"{name}: at least {least:g} m and finite, got {value:g}.")
     body = BallRegion((upstream, 0.0), 0.5 * DIAMETER)
     wide = DIAMETER * np.ceil(width * scale_of.resolution / DIAMETER - 1e-9) / scale_of.resolution
 
     def start(position):
-        apart = position - jnp.asarray([[upstream + 1.5 * DIAMETER, 0.0]])
+        apart = position - jnp.asarray([[upstream + 1.5 * DIAMETER, 0.0]], position.dtype)
         across = KICK * SPEED * jnp.exp(-jnp.sum(apart**2, axis=1) / DIAMETER**2)
         return jnp.stack([jnp.full_like(across, SPEED), across], axis=1)
 

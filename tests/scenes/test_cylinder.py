@@ -43,6 +43,7 @@ def test_wake_is_kicked_once_behind_the_cylinder():
     [
         ({"reynolds": -1.0}, "reynolds: must be positive"),
         ({"width": 1.5}, "width: at least 2 m"),
+        ({"width": np.inf}, "width: at least 2 m and finite"),
         ({"upstream": 0.4}, "upstream: at least 1 m"),
         ({"resolution": 4}, "thinner than twice"),
     ],
@@ -50,3 +51,8 @@ def test_wake_is_kicked_once_behind_the_cylinder():
 def test_bad_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         cylinder(**settings)
+
+
+def test_single_precision_goes_through():
+    scene = cylinder(8, 50.0, h_over_dx=1.3, end_time=0.3, dtype="float32", **NARROW)
+    assert scene.state.velocity.dtype == np.float32

@@ -124,14 +124,22 @@ class ReferenceOperators(eqx.Module):
         """Rates of (r, u) without advection and grad (r, u), at theta: at rest and along a
         direction. One program serves all who ask, whatever the number of modes."""
         at = self.at(values)
+        acting = (CarriedGradients(), *filter(acts_on_ghosts, at.functional.effects))
+        carrying = with_effects(at.functional, acting)
         time = jnp.zeros((), direction.dtype)
 
-        def acting(fields):
+        def rates(fields):
             found = at.functional(time, self._state(fields), self.neighbors)
-            rates = jnp.concatenate([found.density[:, None], found.velocity], axis=1)
-            return rates, at._gradients(fields)
+            return jnp.concatenate([found.density[:, None], found.velocity], axis=1)
 
-        value, slope = jax.jvp(acting, (self.rest,), (direction,))
+        def gradients(fields):
+            _, _, sums = carrying.sums(time, self._state(fields), self.neighbors)
+            count, dim = self.points.shape
+            velocity = sums["carried_velocity"].reshape(count, dim, dim)
+            found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
+            return self.neighbors.unsort(found)
+
+        value, slope = jax.jvp(lambda f: (rates(f), gradients(f)), (self.rest,), (direction,))
         return Acting(*value, *slope)
 
     def affine(
@@ -145,19 +153,6 @@ class ReferenceOperators(eqx.Module):
         """grad (r, u), affine in the fields where walls move."""
         found = self.along(fields - self.rest, self.coefficients.values(self.functional))
         return found.gradients + found.gradients_along
-
-    def _gradients(
-        self, fields: Float[Array, "points fields"]
-    ) -> Float[Array, "points fields dim"]:
-        """grad (r, u)."""
-        acting = (CarriedGradients(), *filter(acts_on_ghosts, self.functional.effects))
-        carrying = with_effects(self.functional, acting)
-        time = jnp.zeros((), fields.dtype)
-        _, _, sums = carrying.sums(time, self._state(fields), self.neighbors)
-        count, dim = self.points.shape
-        velocity = sums["carried_velocity"].reshape(count, dim, dim)
-        found = jnp.concatenate([sums["carried_density"][:, None, :], velocity], axis=1)
-        return self.neighbors.unsort(found)
 
     @property
     def rest(self) -> Float[Array, "points fields"]:

@@ -48,8 +48,17 @@ class LinearOutput(eqx.Module):
         coordinates: Float[Array, "*times modes"],
         values: Float[Array, " coefficients"],
     ) -> Float[Array, "*times outputs"]:
-        """y at coordinates, theta the same for all."""
-        monomials = jnp.concatenate([jnp.ones_like(values[:1]), values])[: len(self.table)]
+        """y at coordinates, theta the same for all.
+
+        Raises:
+            ValueError: if theta is of another number of coefficients than the table.
+        """
+        if values.shape != (len(self.table) - 1,):
+            raise ValueError(
+                f"values: {len(self.table) - 1} coefficients of one member, got shape "
+                f"{values.shape}; give `prediction.values[k]`."
+            )
+        monomials = jnp.concatenate([jnp.ones(1, self.table.dtype), values])
         at = jnp.tensordot(monomials, self.table, 1)
         along = coordinates @ at[:, 1:].T
         return along + jnp.broadcast_to(at[:, 0], along.shape)
@@ -89,8 +98,9 @@ class LinearOutput(eqx.Module):
         ahead = np.concatenate([columns / scale, np.sqrt(ridge * times) * np.eye(count)])
         beside = np.concatenate([wanted, np.zeros((count, wanted.shape[1]))])
         found = np.linalg.lstsq(ahead, beside, rcond=None)[0] / scale[:, None]
-        modes = np.shape(coordinates[0])[1]
-        return cls(jnp.asarray(found.T.reshape(wanted.shape[1], -1, 1 + modes).swapaxes(0, 1)))
+        modes, dtype = np.shape(coordinates[0])[1], np.asarray(coordinates[0]).dtype
+        table = found.T.reshape(wanted.shape[1], -1, 1 + modes).swapaxes(0, 1)
+        return cls(jnp.asarray(table.astype(dtype)))
 
 
 def _columns(coordinates, values) -> Float[np.ndarray, "times columns"]:
@@ -117,7 +127,10 @@ def fit_forces(
         ValueError: if there are other than the model's number of runs, or they have no such part.
     """
     if len(runs) != len(model.points):
-        raise ValueError(f"runs: {len(runs)} for {len(model.points)} training points.")
+        raise ValueError(
+            f"runs: {len(runs)} for {len(model.points)} training points; give those that the model "
+            "was trained on, in their order."
+        )
     coordinates, outputs = [], []
     for run in runs:
         known = run.mean_forces or run.forces

@@ -24,6 +24,14 @@ def test_a_linear_output_is_found_again():
     np.testing.assert_allclose(found.table, wanted.table, atol=1e-10)
 
 
+def test_one_of_a_model_in_single_precision_is_in_single_precision():
+    a = DRAW.normal(size=(9, 2)).astype("float32")
+    output = LinearOutput.fit([a], [np.ones(1, "float32")], [a[:, :1]])
+    found = output(jnp.asarray(a), jnp.ones(1, "float32"))
+    assert found.dtype == jnp.float32
+    np.testing.assert_allclose(found, a[:, :1], atol=1e-4)
+
+
 def test_one_may_be_differentiated_and_swept():
     output = LinearOutput(jnp.asarray(DRAW.normal(size=(2, 1, 3))))
     a, values = jnp.asarray(DRAW.normal(size=(4, 2))), jnp.asarray([0.2])
@@ -65,5 +73,9 @@ def test_what_is_not_there_is_named(plates):
         fit_forces(model, runs[:1], "walls")
     with pytest.raises(ValueError, match="outputs: 3 times for 6 numbers"):
         LinearOutput.fit([np.ones((3, 2))], [np.ones(1)], [np.ones((3, 1))])
+    output = LinearOutput(jnp.ones((2, 1, 3)))
+    for values in (jnp.ones(2), jnp.ones(()), jnp.ones((3, 1))):
+        with pytest.raises(ValueError, match="values: 1 coefficients of one member"):
+            output(jnp.ones((4, 2)), values)
     with pytest.raises(ValueError, match="outputs: 1 runs of them, 2 of coordinates"):
         LinearOutput.fit([np.ones((3, 2))] * 2, [np.ones(1)], [np.ones((3, 1))])
