@@ -86,6 +86,24 @@ def schemes() -> str:
     return markdown(("", "delta-plus", "s", "consistent", "s"), lines())
 
 
+def right_hand_sides() -> str:
+    """What one costs in each scheme, and its gradient by reverse mode in right-hand sides."""
+    both = ("delta-plus", "consistent")
+    header = ("flow", "side", *(f"{scheme} [ms]" for scheme in both), "ratio", "gradients")
+    rows = [
+        (
+            row["scene"],
+            str(row["side"]),
+            *(short(row[f"{scheme}_ms"], 3) for scheme in both),
+            short(row["ratio"], 3),
+            " / ".join(short(row[f"{scheme}_reverse_over_forward"]) for scheme in both),
+        )
+        for row in results("schemes")
+        if row["kind"] == "rates"
+    ]
+    return markdown(header, rows)
+
+
 def settled_cavity() -> str:
     """The cavity in the consistent scheme, run until it is steady."""
     header = ("Re", "particles", "u", "v", "Ghia u", "Ghia v", "last change", "half size, then [s]",

@@ -15,6 +15,7 @@ from .full_tables import (
     ahead_of_time,
     cavity_of_pysph,
     free_flows,
+    right_hand_sides,
     schemes,
     settled_cavity,
     still_water,
@@ -58,6 +59,7 @@ TABLES: dict[str, Callable[[], str]] = {
     table.__name__.replace("_", "-"): table
     for table in (
         schemes,
+        right_hand_sides,
         scheme_models,
         settled_cavity,
         cavity_of_pysph,

@@ -36,9 +36,14 @@ def smooth_divergence(pair, i, j):
     return (j.smooth_velocity - i.smooth_velocity).dot(product(i.correction, pair.gradient))
 
 
+def rough(pair, one):
+    """(u - s) . L grad_i W_ij V_j of one of the two"""
+    return (one.velocity - one.smooth_velocity).dot(product(one.correction, pair.gradient))
+
+
 def rough_divergence(pair, i, j):
-    """(a_j + a_i) . grad_i W_ij V_j"""
-    return (j.rough_velocity + i.rough_velocity).dot(pair.gradient)
+    """[L_j (u_j - s_j) + L_i (u_i - s_i)] . grad_i W_ij V_j"""
+    return rough(pair, j) + rough(pair, i)
 
 
 def pressure_difference(pair, i, j):
@@ -46,9 +51,14 @@ def pressure_difference(pair, i, j):
     return pair.gradient * (j.acting_pressure - i.acting_pressure)
 
 
+def pressed(pair, one):
+    """p L grad_i W_ij V_j of one of the two"""
+    return product(one.correction, pair.gradient) * one.acting_pressure
+
+
 def pressure_flux(pair, i, j):
     """(p_i L_i + p_j L_j) grad_i W_ij V_j"""
-    return product(i.pressure_tensor + j.pressure_tensor, pair.gradient)
+    return pressed(pair, i) + pressed(pair, j)
 
 
 def handed_force(pair, i, j):
@@ -67,32 +77,34 @@ def ghost_mean_velocity(pair, i, j):
 
 
 def ghost_flux(pair, i, j):
-    """a_j . grad_i W_ij V_j"""
-    return j.rough_velocity.dot(pair.gradient)
+    """L_j (u_j - s_j) . grad_i W_ij V_j"""
+    return rough(pair, j)
 
 
 def ghost_force(pair, i, j):
     """p_j L_j grad_i W_ij V_j"""
-    return product(j.pressure_tensor, pair.gradient)
+    return pressed(pair, j)
 
 
 def wall_rough_divergence(pair, i, j):
-    """a_i . grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
-    return i.rough_velocity.dot(pair.gradient) + j.handed_flux * (pair.kernel / i.volume)
+    """L_i (u_i - s_i) . grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
+    return rough(pair, i) + j.handed_flux * (pair.kernel / i.volume)
 
 
 def wall_pressure_flux(pair, i, j):
     """p_i L_i grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
-    return product(i.pressure_tensor, pair.gradient) + j.handed_force * (pair.kernel / i.volume)
+    return pressed(pair, i) + j.handed_force * (pair.kernel / i.volume)
 
 
 WALL_SHARE = PairTerm("wall_share", (), None, Otherwise((), neighbor_share))
+_ROUGH = ("velocity", "smooth_velocity", "correction")
+_PRESSED = ("acting_pressure", "correction")
 _GATHERED = (
     GHOST_WEIGHT,
     PairTerm("ghost_mean_pressure", ("acting_pressure",), ghost_mean_pressure),
     PairTerm("ghost_mean_velocity", ("smooth_velocity",), ghost_mean_velocity),
-    PairTerm("ghost_flux", ("rough_velocity",), ghost_flux),
-    PairTerm("ghost_force", ("pressure_tensor",), ghost_force),
+    PairTerm("ghost_flux", _ROUGH, ghost_flux),
+    PairTerm("ghost_force", _PRESSED, ghost_force),
 )
 _HANDED = (PairTerm("handed_force", ("smoothed_force",), handed_force),)
 
@@ -160,7 +172,7 @@ class AdjointPressure(Effect):
                 "Continuity and PressureForce."
             )
         velocity = fields["velocity"]
-        correction = given(fields, "correction", self, "KernelCorrection")
+        given(fields, "correction", self, "KernelCorrection")
         acting, balance = _acting_pressure(context, fields)
         share = sums["neighbor_share"]
         met = share > _LONELY
@@ -168,26 +180,23 @@ class AdjointPressure(Effect):
         beside = ramp(sums["wall_share"], *_BESIDE) if "wall_share" in sums else 0.0
         smoothing = jnp.where(met, 1.0 - (1.0 - self.boundary_smoothing) * beside, 0.0)[:, None]
         rough = smoothing * (velocity - sums["neighbor_velocity"] / share)
-        sharp = 1.0 + _sharpening(context.space)
         return balance | {
             "acting_pressure": acting,
             "smoothing": smoothing,
             "neighbor_weight": smoothing / share,
             "smooth_velocity": velocity - rough,
-            "rough_velocity": sharp * times(correction, rough),
-            "pressure_tensor": acting[:, None] * correction,
         }
 
     def rate_terms(self, context):
         smooth = ("smooth_velocity", "correction")
         mirrored = Otherwise(("smooth_velocity",), smooth_divergence)
-        rough, flux = ("rough_velocity",), Otherwise(("handed_flux",), wall_rough_divergence)
-        tensor, force = ("pressure_tensor",), Otherwise(("handed_force",), wall_pressure_flux)
+        flux = Otherwise(("handed_flux",), wall_rough_divergence)
+        force = Otherwise(("handed_force",), wall_pressure_flux)
         return (
             PairTerm("smooth_divergence", smooth, smooth_divergence, mirrored),
-            PairTerm("rough_divergence", rough, rough_divergence, flux),
+            PairTerm("rough_divergence", _ROUGH, rough_divergence, flux),
             PairTerm("pressure_difference", ("acting_pressure",), pressure_difference, Same()),
-            PairTerm("pressure_flux", tensor, pressure_flux, force),
+            PairTerm("pressure_flux", _PRESSED, pressure_flux, force),
         )
 
     def ghost_terms(self, context):
@@ -226,7 +235,7 @@ class AdjointPressure(Effect):
             _HANDED, fields | {"smoothed_force": smoothed}, context.space, context.pairs
         )
         gradient = gradient + (1.0 - fields["smoothing"]) * excess + handed["handed_force"]
-        divergence = sums["smooth_divergence"] + sums["rough_divergence"]
+        divergence = sums["smooth_divergence"] + sharp * sums["rough_divergence"]
         divergence = divergence - jnp.sum(volume * divergence) / jnp.sum(volume)
         velocity = -gradient / density[:, None]
         if "balanced_force" in fields:
