@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 from .case import Case
 
+_AS_NONE = 100.0  # percent in the median over time: zero everywhere is wrong by as much
+
 
 def verdict(cases: Sequence[Case]) -> list[str]:
     """A sentence or two for each kind of model, of its number of modes that errs least.
@@ -77,7 +79,8 @@ def _within(judged: Sequence[Case], name: str) -> str:
         worst = max(case.pressure_peak_pascal for case in judged)
         return f"no pressure to compare with (off by {worst:.2g} Pa)"
     peak, median = (_worst(judged, f"{name}_{of}") for of in ("peak", "median"))
-    return f"{name} within {peak:.2g} % ({median:.2g} % in the median over time)"
+    told = f"{name} within {_rounded(peak)} % ({_rounded(median)} % in the median over time)"
+    return f"{told}, no better than none" if median >= _AS_NONE else told
 
 
 def _name(case: Case) -> str:

@@ -29,6 +29,15 @@ def test_times_errors_and_when_it_has_paid():
     )
 
 
+def test_a_field_that_is_wrong_by_all_of_itself_is_said_to_be_no_use():
+    (text,) = verdict(
+        [on_points(125.0, pressure_peak_percent=1964.0, pressure_median_percent=190.0)]
+    )
+    assert "pressure within 2,000 % (190 % in the median over time), no better than none." in text
+    (text,) = verdict([on_points(125.0, pressure_median_percent=99.0)])
+    assert "no better" not in text
+
+
 def test_the_number_of_modes_that_errs_least_speaks_for_its_kind():
     few = [on_points(125.0, modes=3, velocity_peak_percent=0.1)]
     many = [on_points(125.0, modes=10, velocity_peak_percent=0.01, stable=False)]
