@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from functools import partial
 
+from .clumping import Clumping
 from .kept_run import kept_run
 from .progress import shown_steps
 from .simulate import simulate
@@ -30,7 +31,8 @@ def run_scene(
             number of steps done since its last call.
         options: of `simulate`: `stepping`; `measure`, the forces on the scene's walls unless
             another is given, None for nothing; `averaged`, the same where parts of the walls are
-            named, None for nothing; and, without a path, `recorder`.
+            named, None for nothing; `watch`, `Clumping` unless another is given, None for none;
+            and, without a path, `recorder`.
 
     Raises:
         TrajectoryFileError: if the file holds another run, naming what differs; it stays as it is.
@@ -49,6 +51,7 @@ def run_scene(
     forces = WallForces.of(scene)
     options.setdefault("measure", forces)
     options.setdefault("averaged", named(forces))
+    options.setdefault("watch", Clumping(scene.space))
     shown = partial(shown_steps, progress, scene.steps)
     if path is not None:
         return kept_run(

@@ -11,6 +11,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from jaxsph import NeighborSearch, ParticleState, Snapshot, SPHFunctional, WalledSearch
+from jaxsph.clumping import CLUMPED
 from jaxsph.compiled import full_precision
 from jaxsph.effects import Effect
 from jaxsph.full_model import (
@@ -30,7 +31,6 @@ from .projection import Projection, PseudoInverse
 from .still_walls import check_still
 
 _MARGIN = 0.25  # times dx: no particle comes nearer to a wall
-CLUMPED = 0.1  # times dx: evenly spread particles are 0.5 to 1 apart
 
 
 class ReducedState(eqx.Module):

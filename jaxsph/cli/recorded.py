@@ -11,6 +11,7 @@ from tqdm import tqdm
 from jaxsph_command.config import repeating
 from jaxsph_command.errors import fail
 
+from ..clumping import Clumping
 from ..environment import environment
 from ..history import energy_unit
 from ..integrate import Model, SimulationError
@@ -57,6 +58,7 @@ def simulate_and_report(
                 stepping=STEPPING[options.steps],
                 measure=forces,
                 averaged=named(forces),
+                watch=Clumping(scene.space),
             )
             writer.finish(trajectory.metadata)
     except SimulationError as error:
@@ -118,6 +120,8 @@ def _results(scene: Scene, trajectory: Trajectory, path: Path) -> dict[str, Any]
         "compile_seconds": timing.compile_seconds,
         "microseconds_per_particle_and_step": 1e6 * timing.run_seconds / work,
         "errors": _errors(scene, trajectory),
+        "doubt": trajectory.metadata.get("doubt"),
+        "doubt_time": trajectory.metadata.get("doubt_time"),
         "trajectory": str(path),
     }
 
@@ -151,4 +155,6 @@ def _rows(results: dict[str, Any]) -> dict[str, str]:
         velocity, energy = results["errors"].values()
         rows["velocity error"] = f"{100.0 * velocity:.3g} % (relative L2, at the end)"
         rows["kinetic energy error"] = f"{100.0 * energy:.3g} % (at the end)"
+    if results["doubt"] is not None:
+        rows["not to be believed"] = f"from t = {results['doubt_time']:.4g} s: {results['doubt']}"
     return rows

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
-from jaxsph import Box, Trajectory
+from jaxsph import Trajectory
+from jaxsph.clumping import CLUMPED, nearest
 from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import Scene
 
-from ..model import CLUMPED
 from .watch import OFF
 
 
@@ -37,17 +36,6 @@ def level_and_fluctuation(
     safe = np.where(spread > 0.0, spread, 1.0)
     level = np.where(apart == 0.0, 0.0, np.where(spread > 0.0, 100.0 * apart / safe, np.inf))
     return level, relative_discrepancy(reference - means[0], values - means[1])
-
-
-def nearest(position: Float[np.ndarray, "particles dim"], box: Box) -> float:
-    """The least distance between two particles [m], periodic images included."""
-    sides = [
-        length if periodic else 0.0
-        for length, periodic in zip(box.lengths, box.periodic, strict=True)
-    ]
-    inside = np.asarray(position) - np.asarray(box.lower)
-    inside = np.where(sides, np.mod(inside, np.where(sides, sides, 1.0)), inside)
-    return float(cKDTree(inside, boxsize=sides).query(inside, 2)[0][:, 1].min())
 
 
 def doubt(

@@ -9,7 +9,6 @@ from jaxsph import run_scene
 from jaxsph.arrangements import Lattice
 from jaxsph.scenes import taylor_green
 from jaxsph_rom.study import doubt, level_and_fluctuation
-from jaxsph_rom.study.soundness import nearest
 
 
 @pytest.fixture(scope="module")
@@ -26,15 +25,6 @@ def test_level_and_fluctuation_are_apart():
     np.testing.assert_allclose(rest, 8.0)  # the mean of 0.1 |wave|
     level, rest = level_and_fluctuation(0.0 * places, 0.0 * places + 1.0)
     assert np.isinf(level[0]) and rest[0] == 0.0
-
-
-def test_the_nearest_pair_may_be_across_the_box(made):
-    box = made[0].space.box
-    position = np.array([[0.01, 0.5], [0.98, 0.5], [0.5, 0.5]])
-    assert nearest(position, box) == pytest.approx(0.03)
-    assert nearest(position + 1.0, box) == pytest.approx(0.03)
-    walled = dataclasses.replace(box, periodic=(False, True))
-    assert nearest(position, walled) == pytest.approx(0.48)
 
 
 def test_what_is_wrong_first_is_named(made):
