@@ -12,7 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsph import SimulationError
+from jaxsph import ParticleState, SimulationError, Snapshot, Trajectory
 from jaxsph.interpolation import KernelMap, QuadraticMap, ShepardMap
 from jaxsph.io import read_trajectory
 from jaxsph.kept_run import kept_run
@@ -98,8 +98,10 @@ class OnParticles(Method):
             for reynolds in experiment.reynolds:
                 for projection in self.projections:
                     parts = part, kept, projection
-                    *run, more = self._reduced(runs, experiment.trained_on, reynolds, *parts)
-                    yield ReducedRun(reynolds, *run, told | more, made_of)
+                    *run, more, held = self._reduced(
+                        runs, experiment.trained_on, reynolds, *parts
+                    )
+                    yield ReducedRun(reynolds, *run, told | more, made_of, projected=held)
 
     def _made_of(self, runs: FullRuns, experiment: Experiment) -> ModelBasis:
         of_all = experiment.trained_on, self.product, self.centring
@@ -112,7 +114,8 @@ class OnParticles(Method):
         )
 
     def _reduced(self, runs, trained_on, reynolds, basis, interpolation, projection):
-        """Trajectory, profile, fault and what else there is to tell of a run."""
+        """Trajectory, profile and fault of a run, what else there is to tell, and the profile of
+        the full run in the same basis."""
         scene = runs.scene(reynolds)
         first = trained_on[0]
         trained = ((runs.full(r).time, runs.mapped(r, first, self.rule)) for r in trained_on)
@@ -142,15 +145,14 @@ class OnParticles(Method):
         path = runs.folder / "reduced" / f"{self._label}-{numbers}" / f"re-{reynolds:g}"
         path = path / f"m-{basis.size}-{name}.h5"
         label = f"reduced model, Re {reynolds:g}, M = {basis.size}, {name}"
+        model = ReducedModel.of_scene(scene, basis, interpolation, projection, self.advection)
         fault = None
         try:
             run = kept_run(
                 path,
                 recorded,
-                lambda: ReducedModel.of_scene(
-                    scene, basis, interpolation, projection, self.advection
-                ),
-                lambda model: eqx.filter_jit(model.project)(scene.state),
+                lambda: model,
+                lambda model: _held(model, scene.state)[0],
                 restore,
                 lambda done: runs.progress(label, scene.steps, done),
                 {
@@ -168,12 +170,13 @@ class OnParticles(Method):
             "rom_seconds": run.timing.seconds(scene.steps) if fault is None else None,
             "rom_compile_seconds": run.metadata.get("compile_seconds"),
         }
-        profile = probe(run, runs.probes(reynolds), scene.space)
-        return run, profile, fault, told
+        probes, full = runs.probes(reynolds), runs.full(reynolds)
+        profile = probe(run, probes, scene.space)
+        return run, profile, fault, told, probe(held_by(model, full), probes, scene.space)
 
     def _petrov_galerkin(self, memory, scene, basis, interpolation) -> AdjointPetrovGalerkin:
         model = ReducedModel.of_scene(scene, basis, interpolation, Galerkin(), self.advection)
-        tau = memory(model, eqx.filter_jit(model.project)(scene.state))
+        tau = memory(model, _held(model, scene.state)[0])
         # rounded, so that a run that is taken up again finds the very number that it recorded
         return AdjointPetrovGalerkin(jnp.asarray(float(f"{tau:.4g}"), scene.state.density.dtype))
 
@@ -200,6 +203,29 @@ class OnParticles(Method):
             "map": self.rule.__name__,
             "interpolation": self.interpolation.__name__,
         }
+
+
+@eqx.filter_jit  # compiled once for the start and for all snapshots
+def _held(model: ReducedModel, state: ParticleState) -> tuple[ReducedState, Snapshot]:
+    """The reduced state nearest to a full one, and its fields at the same particles."""
+    reduced = model.project(state)
+    return reduced, model.observe(reduced)
+
+
+def held_by(model: ReducedModel, full: Trajectory) -> Trajectory:
+    """A full run as a model's modes hold it at the run's own particles: no model of these modes is
+    nearer to it for long.
+
+    Args:
+        model: its basis and map count.
+        full: the run.
+    """
+    held = [_held(model, full.state(k))[1] for k in range(len(full.time))]
+    fields = {
+        name: np.stack([np.asarray(getattr(snapshot, name)) for snapshot in held])
+        for name in ("velocity", "density", "pressure")
+    }
+    return dataclasses.replace(full, **fields)
 
 
 # the source paper's, as printed

@@ -39,8 +39,9 @@ def test_a_study_about_the_mean(tmp_path):
     np.testing.assert_allclose(own.centre, [[1000.0, 0.0, 0.0]])
 
 
-def test_models_on_points_have_the_floor_of_their_basis_beside_them(tmp_path):
-    study = Study(make, tmp_path, OnPoints())
+@pytest.mark.parametrize("method", [OnPoints(), OnParticles()], ids=["points", "particles"])
+def test_models_have_the_floor_of_their_basis_beside_them(tmp_path, method):
+    study = Study(make, tmp_path, method)
     one, two = study.run(Experiment((100.0,), (100.0,), (1, 2)))
     for outcome in (one, two):
         found = outcome.velocity_percent, outcome.pressure_percent
