@@ -14,10 +14,14 @@ from jaxsph.clumping import Clumping, nearest
 
 
 def stuck(scene, apart):
-    """The scene with its first particle `apart` spacings from the second."""
-    position = scene.state.position
+    """The scene with its first particle `apart` spacings from the second, and as fast."""
+    position, velocity = scene.state.position, scene.state.velocity
     beside = position[1] - jnp.asarray([0.0, apart * scene.space.spacing])
-    state = dataclasses.replace(scene.state, position=position.at[0].set(beside))
+    state = dataclasses.replace(
+        scene.state,
+        position=position.at[0].set(beside),
+        velocity=velocity.at[0].set(velocity[1]),
+    )
     return dataclasses.replace(scene, state=state)
 
 
@@ -56,3 +60,11 @@ def test_the_command_line_says_so_in_its_table_and_its_files(tmp_path, capsys, m
     assert "all is wrong" in (tmp_path / "report.html").read_text()
     kept = jaxsph.io.read_trajectory(tmp_path / "trajectory.h5")
     assert kept.metadata["doubt"] == "all is wrong"
+
+
+@pytest.mark.run_once
+def test_a_sweep_names_the_member(scene, tmp_path):
+    both = [scene, stuck(scene, 0.0)]  # two at one place, as fast, stay together
+    with pytest.warns(UserWarning, match=r"^member 1: particles have clumped") as warned:
+        status = jaxsph.sweep(both, tmp_path / "sweep.h5")
+    assert len(warned) == 1 and (status.code == 0).all()

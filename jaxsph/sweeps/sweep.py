@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from ..clumping import Clumping
 from ..compiled import full_precision
 from ..compiler_options import platform_options
 from ..integrate import FaultCode, integrate
@@ -42,7 +44,7 @@ def sweep(
     `jax.distributed` over those of all processes, which call this alike. What is written after each
     round stays: the same call goes on where a killed one ended. A member that meets a fault ends
     alone, with the snapshots that it had; one whose neighbour list overflows is run anew with more
-    room.
+    room. One whose particles have clumped at its end is named in a warning.
 
     Args:
         scenes: that differ in what their arrays hold: coefficients and starts.
@@ -95,11 +97,22 @@ def _fill(path, members: Members, first: Scene, count: int, batch: int, writes, 
                     continue
                 if writes:
                     sweep_file.store(path, number, snapshots, status)
+                    _warn_of_clumps(first, number, snapshots, int(status[3]))
                 if progress is not None:
                     progress(1)
         if not clumped:
             break
         left, members = np.asarray(clumped), members.enlarged()
+
+
+def _warn_of_clumps(scene: Scene, number: int, snapshots: Snapshot, good: int) -> None:
+    """By the last good snapshot, since it is pairs that stay together that do harm."""
+    if not good:
+        return
+    last = jax.tree.map(lambda a: np.asarray(a[good - 1]), snapshots)
+    why = Clumping(scene.space)(scene.schedule.interval * (good - 1), last)
+    if why is not None:
+        warnings.warn(f"member {number}: {why}.", stacklevel=4)
 
 
 class _Run(NamedTuple):
