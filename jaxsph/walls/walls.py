@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..body_state import BodyState
 from ..pairs import Space
+from .free_body import FreeBodies, FreeBody, checked
 from .moving_body import Bodies, MovingBody
 from .parts import WallPart
 from .region import Region
@@ -69,6 +72,7 @@ class Walls(eqx.Module):
         layers: int | None = None,
         bodies: Sequence[MovingBody] = (),
         parts: Sequence[WallPart] = (),
+        free_bodies: Sequence[FreeBody] = (),
     ) -> Walls:
         """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
 
@@ -81,6 +85,7 @@ class Walls(eqx.Module):
             bodies: that are moved through that region. Where one meets a fixed wall it must reach
                 the kernel's support deep into the region, and should stay that far in.
             parts: of the walls, moving bodies among them, whose forces are recorded by name.
+            free_bodies: that the fluid moves, in two dimensions; as far from fixed walls as above.
 
         Raises:
             ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
@@ -109,7 +114,10 @@ class Walls(eqx.Module):
         depth = distance(lattice)
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
-        if not len(ghosts) and not bodies:
+        moved = (*bodies, *free_bodies)
+        for body in free_bodies:
+            checked(body, space.box)
+        if not len(ghosts) and not moved:
             raise ValueError(
                 "walls: the region of fluid leaves no place for a wall; let the box be closed in "
                 "some direction, or the region smaller than the box."
@@ -135,22 +143,33 @@ class Walls(eqx.Module):
                     "along themselves only."
                 )
         here = [jnp.asarray(a) for a in (ghosts, normal, velocity)]
-        if not bodies:
+        if not moved:
             _check_parts(parts, ghosts)
             return cls(*here, fluid_region, None, tuple(parts))
-        position, normal, owner = _body_ghosts(fluid_region, bodies, space, thickness)
-        owner = jnp.concatenate([jnp.full(len(ghosts), len(bodies)), jnp.asarray(owner)])
-        moved = Bodies.at_start(bodies, owner.astype(jnp.int32), space.box)
+        position, normal, number = _body_ghosts(fluid_region, moved, space, thickness)
+        number = np.concatenate([np.full(len(ghosts), len(moved)), number])
         more = (position, normal, np.zeros_like(position))
         here = [jnp.concatenate([a, jnp.asarray(b)]) for a, b in zip(here, more, strict=True)]
-        here[2] = here[2] + moved.of_ghosts(moved.velocity)
+        free = None
+        if free_bodies:
+            own = (number >= len(bodies)) & (number < len(moved))
+            owner = jnp.asarray(np.where(own, number - len(bodies), len(free_bodies)), jnp.int32)
+            free = FreeBodies.at_start(free_bodies, owner, *here[:2], space)
+            here[2] = here[2] + free.ghost_velocity(*here[:2])
+        owner = jnp.asarray(np.where(number < len(bodies), number, len(bodies)), jnp.int32)
+        start = Bodies.at_start(bodies, owner, space.box, free)
+        here[2] = here[2] + start.of_ghosts(start.velocity)
         _check_parts(parts, np.asarray(here[0]))
-        return cls(*here, fluid_region, moved, tuple(parts))
+        return cls(*here, fluid_region, start, tuple(parts))
 
     @property
     def start_region(self) -> Region:
         """Where fluid may be at t = 0, outside the bodies."""
-        return _without(self.fluid_region, () if self.bodies is None else self.bodies.parts)
+        bodies = self.bodies
+        if bodies is None:
+            return self.fluid_region
+        free = () if bodies.free is None else bodies.free.parts
+        return _without(self.fluid_region, (*bodies.parts, *free))
 
     @property
     def fixed_position(self) -> Float[np.ndarray, "ghosts dim"]:
@@ -158,21 +177,31 @@ class Walls(eqx.Module):
         position = np.asarray(self.position)
         if self.bodies is None:
             return position
-        return position[np.asarray(self.bodies.owner) == len(self.bodies.parts)]
+        fixed = np.asarray(self.bodies.owner) == len(self.bodies.parts)
+        if self.bodies.free is not None:
+            fixed &= np.asarray(self.bodies.free.owner) == len(self.bodies.free.parts)
+        return position[fixed]
 
-    def at(self, time: Float[Array, ""]) -> Walls:
-        """The walls at a time [s]: their bodies' ghosts moved, and their velocities."""
-        if self.bodies is None:
-            return self
-        then = self.bodies.at(time)
-        return Walls(
-            self.position + then.of_ghosts(then.offset - self.bodies.offset),
-            self.normal,
-            self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity),
-            self.fluid_region,
-            then,
-            self.parts,
-        )
+    @property
+    def free(self) -> FreeBodies | None:
+        """The bodies that the fluid moves, if there are any, where they are now."""
+        return None if self.bodies is None else self.bodies.free
+
+    def at(self, time: Float[Array, ""], free: BodyState | None = None) -> Walls:
+        """The walls at a time [s], and their free bodies in a state: their bodies' ghosts moved,
+        and their velocities."""
+        return self if self.bodies is None else self.moved(self.bodies.at(time, free))
+
+    def moved(self, then: Bodies) -> Walls:
+        """The walls with their bodies elsewhere."""
+        position = self.position + then.of_ghosts(then.offset - self.bodies.offset)
+        normal = self.normal
+        velocity = self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity)
+        if then.free is not None:
+            velocity = velocity - self.bodies.free.ghost_velocity(position, normal)
+            position, normal = self.bodies.free.carried(then.free, position, normal)
+            velocity = velocity + then.free.ghost_velocity(position, normal)
+        return Walls(position, normal, velocity, self.fluid_region, then, self.parts)
 
     def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
         """Distance [m] to the nearest wall, negative in the fluid; see `Region`."""
@@ -180,6 +209,19 @@ class Walls(eqx.Module):
         if self.bodies is None:
             return distance
         return jnp.maximum(distance, -self.bodies.signed_distance(position))
+
+    def signed_distance_without(
+        self, number: int, position: Float[Array, "points dim"]
+    ) -> Float[Array, " points"]:
+        """The same for all walls but the free body of that number."""
+        distance, bodies = _distance(self.fluid_region, position), self.bodies
+        others = [k for k in range(len(bodies.free.parts)) if k != number]
+        for other in others:
+            distance = jnp.maximum(distance, -bodies.free.of_body(other, position))
+        if bodies.parts:
+            moved = dataclasses.replace(bodies, free=None)
+            distance = jnp.maximum(distance, -moved.signed_distance(position))
+        return distance
 
     def beyond(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
         """Which particles are inside a wall."""

@@ -1,0 +1,66 @@
+"""Forces and torques that ghosts exert, added up for parts of the walls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .at_ghosts import Otherwise
+from .effects import Effect
+from .effects.local_no_slip import NearWeight
+from .neighbors import WallList
+from .pairs import PairTerm
+from .wall_reaction import reaction_of_ghosts
+from .wall_sums import wall_sums
+from .wall_surface import Loads
+from .walls import Walls
+
+
+def ghost_loads(
+    effects: tuple[Effect, ...],
+    walls: Walls,
+    passed: tuple,
+    neighbors: WallList,
+    held: Float[Array, "parts ghosts"],
+) -> tuple[Loads, Float[Array, "parts particles"]]:
+    """What all sums over the ghosts of each part do to it, and the share that each part has in the
+    walls near each particle.
+
+    Args:
+        effects: of the scene.
+        walls: where they are then.
+        passed: what `SPHFunctional.passes` found.
+        neighbors: the list by which it did.
+        held: 1 for the ghosts of each part, 0 for others; the first part has them all.
+    """
+    context, fields, ghosts, terms, sums = passed
+
+    def rates(sums):
+        parts = (effect.rates(context, fields, sums) for effect in effects)
+        return sum(part["velocity"] for part in parts if "velocity" in part)
+
+    pairs, position = neighbors.wall, fields["position"]
+    held = held[:, pairs.ghosts].astype(position.dtype)
+    depth = walls.signed_distance(ghosts["position"])
+    ghosts = ghosts | {"depth": depth, "held": held.T}
+    on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
+    near = PairTerm("wall_nearness", (), None, Otherwise(("held",), _nearness(context.space)))
+    nearness = wall_sums((near,), fields, ghosts, context.space, pairs)["wall_nearness"].T
+    whole = nearness[:1]
+    shares = nearness / jnp.where(whole > 0.0, whole, 1.0)
+    return jax.tree.map(lambda each: held @ each, on_ghosts), shares
+
+
+@dataclass(frozen=True)
+class _Nearness(NearWeight):
+    """The same for the ghosts of each part by themselves."""
+
+    def __call__(self, pair, i, j):
+        return j.held * self.weight(pair)
+
+
+def _nearness(space) -> _Nearness:
+    return _Nearness(1.0 / space.kernel_at_spacing)
