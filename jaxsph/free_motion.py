@@ -48,8 +48,9 @@ def body_loads(
     free, position = walls.free, fields["position"]
     bodies = jnp.arange(len(free.parts))[:, None] == free.owner[None]
     held = jnp.concatenate([jnp.ones_like(bodies[:1]), bodies])
-    on_parts, shares = ghost_loads(effects, walls, passed, neighbors, held)
-    force, torque = on_parts.force[1:], on_parts.torque[1:]
+    held = held[:, neighbors.wall.ghosts].astype(position.dtype)
+    on_ghosts, shares = ghost_loads(effects, walls, passed, neighbors, held)
+    force, torque = (held[1:] @ each for each in on_ghosts)
     torque = torque - moment(free.state.position.T, force.T)[0]
     none = jnp.zeros_like(position[:0])
     for number, center in enumerate(free.state.position):

@@ -84,10 +84,10 @@ class FullModel(Model):
         )
 
     def step_limit(self, state, change):
-        """The least of 1.5 h / (c0 + |u|) s, 0.25 (h / |a|)^1/2, 0.4 of the skin over |u| and the limits of the
+        """The least of 1.5 h / (c0 + |u|) s, 0.25 (h / |a|)^1/2, 0.4 b / |u| and the limits of the
         effects, with the largest speed of a particle or a body, the largest acceleration of a
-        particle and the neighbour list's skin; the paper's 1.5 h / c0 at rest. s is 1, or
-        `FreeBodies.step_share` where bodies are free."""
+        particle or a free body and the neighbour list's skin b; the paper's 1.5 h / c0 at rest. s
+        is 1, or `FreeBodies.step_share` where there are free bodies."""
         functional = self.functional
         fluid, space = functional.fluid, functional.space
         speed = self._largest_speed(state)

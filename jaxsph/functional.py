@@ -145,8 +145,9 @@ class SPHFunctional(eqx.Module):
     ) -> tuple[Context, dict[str, Array], dict[str, Array], tuple[PairTerm, ...], dict[str, Array]]:
         """Context, fields of the particles and of the ghosts, and the second pass's terms and sums,
         in the list's sorted order."""
-        walls = None if self.walls is None else self.walls.at(time, state.bodies)
-        state = jax.tree.map(neighbors.sort, replace(state, bodies=None))
+        bodies, state = state.bodies, replace(state, bodies=None)
+        state = jax.tree.map(neighbors.sort, state)
+        walls = None if self.walls is None else self.walls.at(time, bodies)
         context = self.context(time, walls, neighbors if walls is None else neighbors.fluid)
         fields = {
             "position": state.position,

@@ -142,13 +142,15 @@ def loads_of(
 ) -> Loads:
     """The same of what `functional.passes` found by a neighbour list; NaN where it overflowed."""
     context, fields, *_ = passed
-    walls = functional.walls_then(context)
-    on_parts, shares = ghost_loads(functional.effects, walls, passed, neighbors, forces.held)
-    turning = None if forces.turning is None else forces.turning.gradient(walls.velocity)
     position = fields["position"]
+    held = forces.held[:, neighbors.wall.ghosts].astype(position.dtype)
+    walls = functional.walls_then(context)
+    on_ghosts, shares = ghost_loads(functional.effects, walls, passed, neighbors, held)
+    turning = None if forces.turning is None else forces.turning.gradient(walls.velocity)
     seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares, turning)
-    found = [effect.on_walls(context, fields, seen) for effect in functional.effects]
-    found = [on_parts, *(each for each in found if each is not None)]
+    found = [jax.tree.map(lambda each: held @ each, on_ghosts)]
+    found += [effect.on_walls(context, fields, seen) for effect in functional.effects]
+    found = [each for each in found if each is not None]
     whole = jax.tree.map(lambda *a: sum(a[1:], a[0]), *found)
     return jax.tree.map(lambda a: jnp.where(neighbors.overflow, jnp.nan, a), whole)
 

@@ -1,10 +1,9 @@
-"""Forces and torques that ghosts exert, added up for parts of the walls."""
+"""What the fluid does to each ghost, and the shares of the walls' parts in what is no pair's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -26,15 +25,16 @@ def ghost_loads(
     neighbors: WallList,
     held: Float[Array, "parts ghosts"],
 ) -> tuple[Loads, Float[Array, "parts particles"]]:
-    """What all sums over the ghosts of each part do to it, and the share that each part has in the
-    walls near each particle.
+    """What all sums do to each ghost, in the order of the list's pairs, and the share that each
+    part has in the walls near each particle.
 
     Args:
         effects: of the scene.
         walls: where they are then.
         passed: what `SPHFunctional.passes` found.
         neighbors: the list by which it did.
-        held: 1 for the ghosts of each part, 0 for others; the first part has them all.
+        held: 1 for the ghosts of each part, 0 for others, in the order of the list's pairs; the
+            first part has them all.
     """
     context, fields, ghosts, terms, sums = passed
 
@@ -42,8 +42,7 @@ def ghost_loads(
         parts = (effect.rates(context, fields, sums) for effect in effects)
         return sum(part["velocity"] for part in parts if "velocity" in part)
 
-    pairs, position = neighbors.wall, fields["position"]
-    held = held[:, pairs.ghosts].astype(position.dtype)
+    pairs = neighbors.wall
     depth = walls.signed_distance(ghosts["position"])
     ghosts = ghosts | {"depth": depth, "held": held.T}
     on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
@@ -51,7 +50,7 @@ def ghost_loads(
     nearness = wall_sums((near,), fields, ghosts, context.space, pairs)["wall_nearness"].T
     whole = nearness[:1]
     shares = nearness / jnp.where(whole > 0.0, whole, 1.0)
-    return jax.tree.map(lambda each: held @ each, on_ghosts), shares
+    return on_ghosts, shares
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from ..kernels import Kernel
 from ..record import record
 from ..schemes import Consistent, Scheme
 from ..walls import BoxRegion, FreeBody, WallPart, Walls
-from .composed import composed, pick_scale
+from .composed import composed, pick_scale, positive
 from .scales import Scale
 from .scene import Scene
 

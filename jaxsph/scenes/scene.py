@@ -130,8 +130,8 @@ class Scene(eqx.Module):
 
     @property
     def stable_time_step(self) -> float:
-        """The largest stable step [s]: acoustic CFL of the paper, shorter for light free bodies, and
-        those of its effects."""
+        """The largest stable step [s]: acoustic CFL of the paper, less where a free body is light,
+        and those of its effects."""
         acoustic = CFL * self.space.smoothing_length / float(self.fluid.sound_speed)
         if self.walls is not None and self.walls.free is not None:
             acoustic *= float(self.walls.free.step_share(self.fluid.reference_density))
