@@ -46,7 +46,8 @@ def body_loads(
     the body's ghosts and the repulsion of its surface do to the fluid, reversed."""
     context, fields = passed[:2]
     free, position = walls.free, fields["position"]
-    bodies = jnp.arange(len(free.parts))[:, None] == free.owner[None]
+    numbers = jnp.arange(len(free.parts), dtype=free.owner.dtype)
+    bodies = numbers[:, None] == free.owner[None]
     held = jnp.concatenate([jnp.ones_like(bodies[:1]), bodies])
     held = held[:, neighbors.wall.ghosts].astype(position.dtype)
     on_ghosts, shares = ghost_loads(effects, walls, passed, neighbors, held)

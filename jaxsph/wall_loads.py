@@ -44,6 +44,9 @@ def ghost_loads(
 
     pairs = neighbors.wall
     depth = walls.signed_distance(ghosts["position"])
+    if walls.free is not None:  # a turn's round-off must not put one before its surface
+        own = walls.free.owner[pairs.ghosts] < len(walls.free.parts)
+        depth = jnp.where(own, walls.free.depth[pairs.ghosts], depth)
     ghosts = ghosts | {"depth": depth, "held": held.T}
     on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
     near = PairTerm("wall_nearness", (), None, Otherwise(("held",), _nearness(context.space)))

@@ -141,7 +141,8 @@ class FreeBodies(eqx.Module):
         layer, dx = np.zeros((len(parts), 3, 3)), space.spacing
         for number, body in enumerate(parts):
             own = np.asarray(owner) == number
-            depth[own] = -np.asarray(body.region.signed_distance(position[own]))
+            distance = np.asarray(body.region.signed_distance(position[own]))
+            depth[own] = np.maximum(-distance, 0.0)  # one on the surface may be round-off before it
             way = np.asarray(position[own]) - np.asarray(body.center)
             reach[number] = (np.linalg.norm(way, axis=1) + depth[own]).max()
             n = np.asarray(normal[own])
