@@ -12,7 +12,7 @@ from jax import lax
 from .effects import Effect
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
-from .likely_cause import likely_cause
+from .likely_cause import likely_cause, squeezed_water
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
 from .particles import ParticleState
 from .trajectory import Snapshot
@@ -128,6 +128,9 @@ class FullModel(Model):
         limit = float(here.step_limit(state, jnp.zeros((), state.position.dtype)))
         of = here._beside(state).functional
         particle = int(fault.particle)
+        squeezed = squeezed_water(of.walls, of.space)
+        if squeezed is not None:
+            return squeezed
         return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
     def enlarged(self):

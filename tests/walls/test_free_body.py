@@ -36,6 +36,7 @@ from jaxsph.effects import (
 from jaxsph.full_model import body_checks
 from jaxsph.integrate import AutomaticSteps, Fault, FaultCode, FixedSteps, integrate
 from jaxsph.kernels import WendlandC2
+from jaxsph.likely_cause import squeezed_water
 from jaxsph.scenes import Scene
 from jaxsph.schemes import Consistent
 from jaxsph.walls.walls import fill
@@ -279,6 +280,14 @@ def test_a_body_at_a_wall_is_a_fault(tank, model):
     assert int(fault.code) == FaultCode.BODY_MET_WALL and int(fault.step) == 3
     lost = eqx.tree_at(lambda s: s.bodies.spin, tank.state, jnp.asarray([jnp.nan]))
     assert int(inspect(jnp.asarray(3), lost, neighbors).code) == FaultCode.NOT_FINITE
+
+
+def test_the_cause_of_a_fault_is_named_where_a_body_is_close_to_a_wall(tank):
+    start = tank.state.bodies
+    down = eqx.tree_at(lambda s: s.position, start, start.position - jnp.asarray([[0.0, 0.4]]))
+    assert squeezed_water(tank.walls, SPACE) is None
+    # 0.97 - 0.4 - 0.42 m off the floor
+    assert "free body 0 is 1.5 spacings" in squeezed_water(tank.walls.at(START, down), SPACE)
 
 
 def test_two_bodies_that_meet_are_a_fault():
