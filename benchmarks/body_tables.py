@@ -22,8 +22,8 @@ def floating_box() -> str:
         unit = "s" if of == "period" else "m"
         off = short(row[f"{of}_error_percent"], 2)
         return (
-            str(row["resolution"]), start, f"{of} {short(found, 3)} {unit}",
-            f"{short(expected, 3)} {unit}", f"{off} %", short(row["largest_angle"], 2),
+            str(row["resolution"]), start, f"{of} {short(found, 4)} {unit}",
+            f"{short(expected, 4)} {unit}", f"{off} %", short(row["largest_angle"], 2),
         )  # fmt: skip
 
     return markdown(header, (line(row) for row in results("floating_box")))
