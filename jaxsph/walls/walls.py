@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 from typing import final
 
 import equinox as eqx
@@ -21,12 +20,11 @@ from ..pairs import Space
 from .free_body import FreeBodies, FreeBody, checked
 from .moving_body import Bodies, MovingBody
 from .parts import WallPart
+from .refusals import place, refuse_gaps, refuse_thin_walls, refuse_torn_walls
 from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
-_PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
-_TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
 
 
 @final
@@ -108,8 +106,8 @@ class Walls(eqx.Module):
         if layers < 1:
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
         distance = partial(_in_blocks, _distance, fluid_region)
-        _refuse_gaps(distance, space)
-        _refuse_torn_walls(distance, space)
+        refuse_gaps(distance, space)
+        refuse_torn_walls(distance, space)
         lattice = space.lattice(layers)
         depth = distance(lattice)
         thickness = layers * space.spacing
@@ -124,7 +122,7 @@ class Walls(eqx.Module):
             )
         normal = _normals(fluid_region, ghosts)
         depth = distance(ghosts)[:, None]
-        _refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
+        refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
         skin = ghosts + (1.0 - _HAIR) * depth * normal
         velocity = np.zeros_like(ghosts)
         for lid in moving:
@@ -265,7 +263,7 @@ def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
     if not np.all(length > 0.5):
         where = ghosts[int(np.argmin(length))]
         raise ValueError(
-            f"walls: the signed distance has no slope at {_at(where)}; its gradient must point "
+            f"walls: the signed distance has no slope at {place(where)}; its gradient must point "
             "away from the fluid everywhere in the wall."
         )
     return normal / length
@@ -290,12 +288,12 @@ def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Spac
             )
         normal = _normals(~body.region, ghosts)
         surface = ghosts + depth[held][:, None] * normal
-        _refuse_thin_walls(wet, space, surface, normal)
+        refuse_thin_walls(wet, space, surface, normal)
         behind = np.asarray(space.box.wrap(jnp.asarray(surface - space.support * normal)))
         shallow = (wet(surface + 0.5 * space.spacing * normal) < 0.0) & (fixed(behind) > 0.0)
         if shallow.any():
             raise ValueError(
-                f"moving body: at {_at(surface[int(np.argmax(shallow))])} a fixed wall is nearer "
+                f"moving body: at {place(surface[int(np.argmax(shallow))])} a fixed wall is nearer "
                 f"behind its face than the kernel's support of {space.support:.3g} m; the fluid "
                 "would feel that wall. Make the body thicker or raise the resolution."
             )
@@ -366,66 +364,3 @@ def _put_off(region: Region, position, margin: float):
     near = (excess > 0.0) & (squared > 0.0)
     move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
     return position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
-
-
-def _at(point) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
-
-
-def _refuse_gaps(distance, space: Space) -> None:
-    """The fluid must not reach past a closed face of the box."""
-    box = space.box
-    for axis, side in product(range(box.dim), (0, 1)):
-        if box.periodic[axis]:
-            continue
-        face = _face(space, axis, (box.lower, box.upper)[side][axis])
-        depth = distance(face)
-        if depth.min() < -_TOUCH * space.spacing:
-            raise ValueError(
-                f"walls: a gap at {_at(face[int(np.argmin(depth))])}: the fluid reaches past a "
-                "closed face of its box there. Close it with a wall, widen the box, or make that "
-                "direction periodic."
-            )
-
-
-def _refuse_torn_walls(distance, space: Space) -> None:
-    """What is wall on one periodic face of the box must be wall on the other: it is one place."""
-    box, least = space.box, _TOUCH * space.spacing
-    for axis in range(box.dim):
-        if not box.periodic[axis]:
-            continue
-        faces = [_face(space, axis, end[axis]) for end in (box.lower, box.upper)]
-        low, high = (distance(face) for face in faces)
-        torn = ((low > least) & (high < -least)) | ((low < -least) & (high > least))
-        if torn.any():
-            here, there = (face[int(np.argmax(torn))] for face in faces)
-            raise ValueError(
-                f"walls: torn at a periodic face of the box: {_at(here)} and {_at(there)} are one "
-                "place, a wall by the one and fluid by the other. Move the body off the face, or "
-                "join it with its copy a box's length further: body | copy."
-            )
-
-
-def _face(space: Space, axis: int, at: float) -> np.ndarray:
-    """Points of a face of the box, a fraction of a spacing apart."""
-    box, ticks = space.box, []
-    for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
-        count = 1 if k == axis else max(2, round(length / (_PITCH * space.spacing)) + 1)
-        ticks.append(low + np.linspace(0.0, length, count))
-    ticks[axis] = np.asarray([at])
-    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
-
-
-def _refuse_thin_walls(distance, space: Space, surface, normal) -> None:
-    """Fluid on one side of a wall must not be felt on the other, nor by the other's ghosts."""
-    needed = 2.0 * space.support
-    for depth in np.arange(0.25, needed / space.spacing, 0.5) * space.spacing:
-        behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
-        wet = distance(behind) < 0.0
-        if wet.any():
-            raise ValueError(
-                f"walls: the wall at {_at(surface[int(np.argmax(wet))])} is about {depth:.3g} m "
-                f"thick, thinner than twice the kernel's support of {space.support:.3g} m; the "
-                "fluids on its two sides would feel each other. Make it thicker or raise the "
-                "resolution."
-            )
