@@ -47,8 +47,8 @@ def refuse_torn_walls(distance, space: Space) -> None:
             here, there = (face[int(np.argmax(torn))] for face in faces)
             raise ValueError(
                 f"walls: torn at a periodic face of the box: {place(here)} and {place(there)} are "
-                "one place, a wall by the one and fluid by the other. Move the body off the face, or "
-                "join it with its copy a box's length further: body | copy."
+                "one place, a wall by the one and fluid by the other. Move the body off the face, "
+                "or join it with its copy a box's length further: body | copy."
             )
 
 
