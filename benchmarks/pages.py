@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from .body_tables import floating_box, light_bodies, taylor_couette
 from .full_tables import (
     ahead_of_time,
     cavity_of_pysph,
@@ -77,6 +78,9 @@ TABLES: dict[str, Callable[[], str]] = {
         label_galerkin,
         cylinder_wake,
         wake_models,
+        floating_box,
+        light_bodies,
+        taylor_couette,
     )  # fmt: skip
 }
 

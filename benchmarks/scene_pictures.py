@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 from jaxsph.cli import main as jaxsph
-from jaxsph.io import read_box, read_snapshot, read_walls
+from jaxsph.io import read_box, read_snapshot, read_walls_of
 from jaxsph.plotting import FIELDS, snapshot_figure
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
@@ -36,6 +36,8 @@ OPTIONS = {
     "poiseuille-open": "--resolution 20 --t-end 1",
     "sloshing": "--t-end 3",
     "piston-wave-maker": "--t-end 2.4",
+    "floating-box": "--lift 0.08 --t-end 0.6",
+    "taylor-couette": "--resolution 16 --t-end 0.5",
     "open-cavity": "--resolution 40 --t-end 0.5",
     "channel-cylinder": "--resolution 33 --t-end 2",
     "cylinder": "--resolution 10 --width 6 --upstream 4 --downstream 6 --t-end 60",
@@ -60,7 +62,8 @@ def main(argv: list[str] | None = None) -> int:
 def draw(name: str, trajectory: Path) -> None:
     """The picture of a run."""
     field = FIELDS[_FIELDS.get(name, "velocity")]
-    figure = snapshot_figure(*read_snapshot(trajectory), (field,), read_walls(trajectory),
+    time, snapshot = read_snapshot(trajectory)
+    figure = snapshot_figure(time, snapshot, (field,), read_walls_of(trajectory, snapshot),
                              read_box(trajectory))  # fmt: skip
     figure.savefig(FIGURES / f"scene_{name.replace('-', '_')}.png", dpi=_DPI, facecolor="white")
 

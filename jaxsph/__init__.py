@@ -16,6 +16,7 @@ from .at_ghosts import AtGhost as AtGhost
 from .at_ghosts import Mirrored as Mirrored
 from .at_ghosts import Otherwise as Otherwise
 from .at_ghosts import Same as Same
+from .body_state import BodyState as BodyState
 from .compiler_options import COMPILER_OPTIONS as COMPILER_OPTIONS
 from .compiler_options import platform_options as platform_options
 from .domain import Box as Box
@@ -49,6 +50,7 @@ from .version import __version__ as __version__
 from .wall_forces import WallForces as WallForces
 from .walls import BallRegion as BallRegion
 from .walls import BoxRegion as BoxRegion
+from .walls import FreeBody as FreeBody
 from .walls import MovingBody as MovingBody
 from .walls import MovingWall as MovingWall
 from .walls import Outline as Outline

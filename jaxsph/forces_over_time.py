@@ -76,8 +76,7 @@ class ForcesOverTime(Model):
     def rates(self, time, state, auxiliary):
         functional = self.model.functional
         passed = functional.passes(time, state.particles, auxiliary)
-        context, fields, _, _, sums = passed
-        rates = functional.rates(context, fields, sums, auxiliary)
+        rates = functional.rates_of(passed, auxiliary)
         return WithImpulse(rates, loads_of(self.forces, functional, passed, auxiliary))
 
     def at(self, time):

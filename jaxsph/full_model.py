@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import lax
 
 from .effects import Effect
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
-from .likely_cause import likely_cause
+from .likely_cause import likely_cause, squeezed_water
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
 from .particles import ParticleState
 from .trajectory import Snapshot
@@ -39,19 +40,30 @@ class FullModel(Model):
         walls = self.functional.walls
         if walls is None or walls.bodies is None:
             return self
-        walls = walls.at(time)
+        return self._with(walls.at(time))
+
+    def _with(self, walls: Walls) -> FullModel:
         functional = dataclasses.replace(self.functional, walls=walls)
         return dataclasses.replace(
             self, functional=functional, search=self.search.moved(walls.position)
         )
 
+    def _beside(self, state: ParticleState) -> FullModel:
+        """The same with its free bodies where a state has them; itself where there are none."""
+        walls = self.functional.walls
+        if walls is None or walls.free is None:
+            return self
+        bodies = dataclasses.replace(walls.bodies, free=walls.free.at(state.bodies))
+        return self._with(walls.moved(bodies))
+
     def prepare(self, state: ParticleState) -> VerletList | WallList:
-        return self.search.build(state.position)
+        return self._beside(state).search.build(state.position)
 
     def refresh(self, auxiliary, state, time_step):
         speed = self._largest_speed(state)
         speed = speed + SHIFT_SHARE * self.functional.fluid.reference_speed
-        return refresh_list(self.search, auxiliary, state.position, speed * time_step)
+        search = self._beside(state).search
+        return refresh_list(search, auxiliary, state.position, speed * time_step)
 
     def rates(self, time, state, auxiliary):
         return self.functional(time, state, auxiliary)
@@ -61,21 +73,27 @@ class FullModel(Model):
         return eqx.tree_at(lambda s: s.position, state, box.wrap(state.position))
 
     def inspect(self, step, state, auxiliary):
+        here = self._beside(state)
+        walls = here.functional.walls
         return Fault.first_of(
             step,
-            *wall_checks(self.functional.walls, state.position),
-            *field_checks(state, self.functional.fluid.reference_density),
-            *list_checks(self.search, auxiliary, state.position),
+            *body_checks(walls),
+            *wall_checks(walls, state.position),
+            *field_checks(state, here.functional.fluid.reference_density),
+            *list_checks(here.search, auxiliary, state.position),
         )
 
     def step_limit(self, state, change):
-        """The least of 1.5 h / (c0 + |u|), 0.25 (h / |a|)^1/2, 0.4 s / |u| and the limits of the
+        """The least of 1.5 h / (c0 + |u|) s, 0.25 (h / |a|)^1/2, 0.4 b / |u| and the limits of the
         effects, with the largest speed of a particle or a body, the largest acceleration of a
-        particle and the neighbour list's skin s; the paper's 1.5 h / c0 at rest."""
+        particle or a free body and the neighbour list's skin b; the paper's 1.5 h / c0 at rest. s
+        is 1, or `FreeBodies.step_share` where there are free bodies."""
         functional = self.functional
         fluid, space = functional.fluid, functional.space
         speed = self._largest_speed(state)
         limit = CFL * space.smoothing_length / (fluid.sound_speed + speed)
+        if functional.walls is not None and functional.walls.free is not None:
+            limit = limit * functional.walls.free.step_share(fluid.reference_density)
         moving = speed > 0.0
         outrun = SKIN_SHARE * self.search.skin / jnp.where(moving, speed, 1.0)
         limit = jnp.where(moving, jnp.minimum(limit, outrun), limit)
@@ -89,13 +107,17 @@ class FullModel(Model):
     def _largest_speed(self, state):
         """Of a particle, or of a body that is moved."""
         speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=1)))
-        walls = self.functional.walls
+        walls = self._beside(state).functional.walls
         if walls is None or walls.bodies is None:
             return speed
         return jnp.maximum(speed, walls.bodies.speed)
 
     def largest_change(self, old, new):
-        return jnp.sqrt(jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1)))
+        change = jnp.max(jnp.sum((new.velocity - old.velocity) ** 2, axis=1))
+        if old.bodies is not None:
+            of_bodies = jnp.sum((new.bodies.velocity - old.bodies.velocity) ** 2, axis=1)
+            change = jnp.maximum(change, jnp.max(of_bodies))
+        return jnp.sqrt(change)
 
     def with_effect(self, effect: Effect):
         """The same with other coefficients of one effect; see `SPHFunctional.with_effect`."""
@@ -104,8 +126,11 @@ class FullModel(Model):
     def likely_cause(self, fault, state, time_step):
         here = self.at(jnp.asarray(int(fault.step) * time_step, state.position.dtype))
         limit = float(here.step_limit(state, jnp.zeros((), state.position.dtype)))
-        of = here.functional
+        of = here._beside(state).functional
         particle = int(fault.particle)
+        squeezed = squeezed_water(of.walls, of.space)
+        if squeezed is not None:
+            return squeezed
         return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
     def enlarged(self):
@@ -117,6 +142,7 @@ class FullModel(Model):
             velocity=state.velocity,
             density=state.density,
             pressure=self.functional.fluid.pressure(state.density),
+            bodies=state.bodies,
         )
 
 
@@ -133,6 +159,24 @@ def list_checks(search, neighbors: VerletList | WallList, position):
     return (
         (FaultCode.NEIGHBOR_OVERFLOW, neighbors.overflow, -1),
         (FaultCode.NEIGHBORS_OUTDATED, moved > 0.5 * search.skin, particle),
+    )
+
+
+def body_checks(walls: Walls | None):
+    """The checks that free bodies are finite, and in no wall nor in one another."""
+    free = None if walls is None else walls.free
+    if free is None:
+        return ()
+    free = lax.stop_gradient(free)
+    lost = [~jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(free.state)]
+    places = free.surface(*lax.stop_gradient((walls.position, walls.normal)))
+    met = []
+    for number in range(len(free.parts)):
+        apart = -walls.signed_distance_without(number, places)
+        met.append(jnp.any((free.owner == number) & (apart < 0.0)))
+    return (
+        *((FaultCode.NOT_FINITE, each, -1) for each in lost),
+        *((FaultCode.BODY_MET_WALL, each, -1) for each in met),
     )
 
 

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from .compiled import full_precision
 from .effects import BodyForce, Context, Effect
 from .fluid import Fluid
+from .free_motion import body_rates
 from .neighbors import VerletList, WallList
 from .pairs import PairTerm, Space, pair_sum
 from .particles import ParticleState, in_dtype
@@ -77,7 +78,18 @@ class SPHFunctional(eqx.Module):
             state: the particles.
             neighbors: a `WallList` where there are walls, else a `VerletList`.
         """
-        return self.rates(*self.sums(time, state, neighbors), neighbors)
+        return self.rates_of(self.passes(time, state, neighbors), neighbors)
+
+    @full_precision
+    def rates_of(self, passed: tuple, neighbors: VerletList | WallList) -> ParticleState:
+        """The same from what `passes` found, with the rates of bodies that are free."""
+        context, fields, _, _, sums = passed
+        rates = self.rates(context, fields, sums, neighbors)
+        if context.bodies is None or context.bodies.free is None:
+            return rates
+        walls = self.walls_then(context)
+        with jax.named_scope("free_bodies"):
+            return replace(rates, bodies=body_rates(self.effects, walls, passed, neighbors))
 
     @full_precision
     def rates(
@@ -87,7 +99,7 @@ class SPHFunctional(eqx.Module):
         sums: dict[str, Array],
         neighbors: VerletList | WallList,
     ) -> ParticleState:
-        """The same from the sums of the second pass."""
+        """The particles' from the sums of the second pass."""
         rates = {
             "position": fields["velocity"],
             "velocity": jnp.zeros_like(fields["velocity"]),
@@ -115,6 +127,11 @@ class SPHFunctional(eqx.Module):
         forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
         return Context(time, self.fluid, self.mass, self.space, bodies, forces, pairs)
 
+    def walls_then(self, context: Context) -> Walls:
+        """The walls where they are in a context of this functional."""
+        free = None if context.bodies is None else context.bodies.free
+        return self.walls.at(context.time, None if free is None else free.state)
+
     def sums(
         self, time: Float[Array, ""], state: ParticleState, neighbors: VerletList | WallList
     ) -> tuple[Context, dict[str, Array], dict[str, Array]]:
@@ -128,8 +145,9 @@ class SPHFunctional(eqx.Module):
     ) -> tuple[Context, dict[str, Array], dict[str, Array], tuple[PairTerm, ...], dict[str, Array]]:
         """Context, fields of the particles and of the ghosts, and the second pass's terms and sums,
         in the list's sorted order."""
+        bodies, state = state.bodies, replace(state, bodies=None)
         state = jax.tree.map(neighbors.sort, state)
-        walls = None if self.walls is None else self.walls.at(time)
+        walls = None if self.walls is None else self.walls.at(time, bodies)
         context = self.context(time, walls, neighbors if walls is None else neighbors.fluid)
         fields = {
             "position": state.position,
@@ -171,7 +189,7 @@ class SPHFunctional(eqx.Module):
             "volume": jnp.full(order.shape, self.mass / self.fluid.reference_density),
         }
         if walls.bodies is not None:
-            acceleration = walls.bodies.of_ghosts(walls.bodies.acceleration)
+            acceleration = walls.bodies.ghost_acceleration(walls.position, walls.normal)
             ghosts["wall_acceleration"] = acceleration[order]
         return ghosts
 

@@ -12,9 +12,33 @@ from .walls import Walls
 _NEAR = 0.25  # times dx: half of where a particle rests beside a wall
 _BESIDE = 1.0  # times dx: of a wall that makes a corner with another
 _CLUMPED = 0.5  # times dx
+_SQUEEZED = 2.0  # times dx: so near to a wall few particles are left between it and a free body
 _FAST = 0.3  # of the sound speed: the density changes by the square of it
 _TENSION = 0.01  # of rho0 below it
 _BEYOND = 1.25  # times the step limit, which a flow that is being lost exceeds a little anyway
+
+
+def squeezed_water(walls: Walls | None, space: Space) -> str | None:
+    """That a free body is about to touch something, and what to do; None if none is. On the host.
+
+    Args:
+        walls: where they are, if there are any.
+        space: kernel and spacing.
+    """
+    free = None if walls is None else walls.free
+    if free is None:
+        return None
+    places, owner = free.surface(walls.position, walls.normal), np.asarray(free.owner)
+    for number in range(len(free.parts)):
+        own = np.asarray(places)[owner == number]
+        gap = -float(np.max(walls.signed_distance_without(number, own))) / space.spacing
+        if gap < _SQUEEZED:
+            return (
+                f"likely contact, which is not modelled: free body {number} is {gap:.2g} spacings "
+                "from a wall or another body, and the water between them is pressed out; end the "
+                "run before, or leave more room around the body"
+            )
+    return None
 
 
 def likely_cause(

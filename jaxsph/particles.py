@@ -10,13 +10,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .body_state import BodyState
+
 
 class ParticleState(eqx.Module):
-    """Positions [m], velocities [m/s] and densities [kg/m^3] of N particles; also their rates."""
+    """Positions [m], velocities [m/s] and densities [kg/m^3] of N particles; also their rates.
+
+    `bodies` is the state of the free bodies in the fluid, if there are any.
+    """
 
     position: Float[Array, "particles dim"]
     velocity: Float[Array, "particles dim"]
     density: Float[Array, " particles"]
+    bodies: BodyState | None = None
 
 
 def in_dtype(tree: Any, dtype) -> Any:

@@ -162,6 +162,7 @@ def simulate(
             torques=stacked.torques,
             mean_forces=stacked.mean_forces,
             mean_torques=stacked.mean_torques,
+            bodies=stacked.bodies,
             metadata={**metadata, **took.metadata()},
         )
 

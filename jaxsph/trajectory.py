@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .body_state import BodyState
 from .particles import ParticleState
 from .shown import concrete, line, spread, table
 from .timing import Timing
@@ -23,7 +24,8 @@ class Snapshot(eqx.Module):
 
     `coordinates` are the reduced coordinates where a reduced model made the snapshot; `forces` (n,)
     [N] and `torques` [N m] those of the fluid on its walls and their named parts, where measured,
-    `mean_forces` and `mean_torques` their means over the time since the snapshot before.
+    `mean_forces` and `mean_torques` their means over the time since the snapshot before; `bodies`
+    the state of free bodies, where there are any.
     """
 
     position: Float[Array, "*times particles dim"]
@@ -35,6 +37,7 @@ class Snapshot(eqx.Module):
     torques: dict[str, Array] = eqx.field(default_factory=dict)
     mean_forces: dict[str, Array] = eqx.field(default_factory=dict)
     mean_torques: dict[str, Array] = eqx.field(default_factory=dict)
+    bodies: BodyState | None = None
 
 
 class Trajectory(eqx.Module):
@@ -51,6 +54,7 @@ class Trajectory(eqx.Module):
         mean_forces, mean_torques: their means over the time since the snapshot before, of every
             stage of every step; the first ones those of its instant.
         metadata: scene, parameters, and what the run took; JSON-like.
+        bodies: the state of free bodies (S, F, ...), where there are any.
     """
 
     time: Float[np.ndarray, " times"]
@@ -64,6 +68,7 @@ class Trajectory(eqx.Module):
     mean_forces: dict[str, Float[np.ndarray, "times dim"]] = eqx.field(default_factory=dict)
     mean_torques: dict[str, Float[np.ndarray, "times ..."]] = eqx.field(default_factory=dict)
     metadata: dict[str, Any] = eqx.field(static=True, default_factory=dict)
+    bodies: BodyState | None = None
 
     @property
     def particles(self) -> int:
@@ -85,7 +90,8 @@ class Trajectory(eqx.Module):
     def state(self, number: int) -> ParticleState:
         """The particles of a snapshot, as a run can go on from them; -1 for the last."""
         fields = (self.position, self.velocity, self.density)
-        return ParticleState(*(jnp.asarray(field[number]) for field in fields))
+        fields = (*fields, self.bodies)
+        return ParticleState(*jax.tree.map(lambda field: jnp.asarray(field[number]), fields))
 
     def snapshot(self, number: int) -> Snapshot:
         """A snapshot by its number; -1 for the last."""
@@ -93,7 +99,8 @@ class Trajectory(eqx.Module):
         fields = (self.position, self.velocity, self.density, self.pressure)
         of_all = (self.forces, self.torques, self.mean_forces, self.mean_torques)
         loads = ({k: v[number] for k, v in each.items()} for each in of_all)
-        return Snapshot(*(field[number] for field in fields), coordinates, *loads)
+        bodies = jax.tree.map(lambda field: field[number], self.bodies)
+        return Snapshot(*(field[number] for field in fields), coordinates, *loads, bodies)
 
     # What follows imports inside, since plotting and io import this module.
 
@@ -116,7 +123,8 @@ class Trajectory(eqx.Module):
         Args:
             path: of the picture, ending with `.gif` or `.mp4`; one that is there is replaced.
             options: of `jaxsph.plotting.animate`, as `field` and `every`; `walls` and
-                `box` as for `plot`.
+                `box` as for `plot`; `shapes` of free bodies,
+                `jaxsph.io.BodyShapes.of(scene.walls)`.
 
         Raises:
             ValueError: as `jaxsph.plotting.animate`.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import equinox as eqx
@@ -12,17 +11,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.spatial import cKDTree
 
-from .at_ghosts import Otherwise
 from .compiled import compiled, full_precision
-from .effects.local_no_slip import NearWeight
 from .full_model import FullModel
 from .functional import SPHFunctional
 from .neighbors import WallList
-from .pairs import PairTerm
 from .particles import ParticleState
 from .shown import concrete
-from .wall_reaction import reaction_of_ghosts
-from .wall_sums import wall_sums
+from .wall_loads import ghost_loads
 from .wall_surface import Loads, WallSurface
 from .walls.parts import WHOLE
 from .walls.surface import surface
@@ -146,22 +141,11 @@ def loads_of(
     forces: WallForces, functional: SPHFunctional, passed: tuple, neighbors: WallList
 ) -> Loads:
     """The same of what `functional.passes` found by a neighbour list; NaN where it overflowed."""
-    context, fields, ghosts, terms, sums = passed
-
-    def rates(sums):
-        parts = (effect.rates(context, fields, sums) for effect in functional.effects)
-        return sum(part["velocity"] for part in parts if "velocity" in part)
-
-    pairs, position = neighbors.wall, fields["position"]
-    held = forces.held[:, pairs.ghosts].astype(position.dtype)
-    walls = functional.walls.at(context.time)
-    depth = walls.signed_distance(ghosts["position"])
-    ghosts = ghosts | {"depth": depth, "held": held.T}
-    on_ghosts = reaction_of_ghosts(terms, rates, fields, sums, ghosts, context, pairs)
-    near = PairTerm("wall_nearness", (), None, Otherwise(("held",), _nearness(context.space)))
-    nearness = wall_sums((near,), fields, ghosts, context.space, pairs)["wall_nearness"].T
-    whole = nearness[:1]
-    shares = nearness / jnp.where(whole > 0.0, whole, 1.0)
+    context, fields, *_ = passed
+    position = fields["position"]
+    held = forces.held[:, neighbors.wall.ghosts].astype(position.dtype)
+    walls = functional.walls_then(context)
+    on_ghosts, shares = ghost_loads(functional.effects, walls, passed, neighbors, held)
     turning = None if forces.turning is None else forces.turning.gradient(walls.velocity)
     seen = WallSurface(forces.points, forces.areas, forces.parts, position, shares, turning)
     found = [jax.tree.map(lambda each: held @ each, on_ghosts)]
@@ -189,15 +173,3 @@ def _whole(forces: WallForces, model: FullModel, time, state) -> Loads:
             return found
         model = model.enlarged()
     raise ValueError("state: particles clump, far more beside each other than at rest.")
-
-
-@dataclass(frozen=True)
-class _Nearness(NearWeight):
-    """The same for the ghosts of each part by themselves."""
-
-    def __call__(self, pair, i, j):
-        return j.held * self.weight(pair)
-
-
-def _nearness(space) -> _Nearness:
-    return _Nearness(1.0 / space.kernel_at_spacing)

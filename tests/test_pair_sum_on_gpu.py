@@ -20,7 +20,8 @@ from jaxsph.scenes import SCENES
 from tests.test_pairs import HARDEST, Case
 from tests.test_wall_sums import case as walled
 
-FINER = {"open-cavity": 24, "channel-cylinder": 24, "piston-wave-maker": 64}  # as their walls need
+FINER = {"open-cavity": 24, "channel-cylinder": 24, "piston-wave-maker": 64,
+         "floating-box": 60}  # as their walls need  # fmt: skip
 QUICK = ("taylor-green", "lid-driven-cavity", "dam-break", "oscillating-drop")  # unlike each other
 
 

@@ -8,9 +8,10 @@ from typing import Any
 from jaxsph_command.errors import Parser
 
 from ..history import energy_unit, read_history
-from ..io import Overview, check_target, read_box, read_overview, read_snapshot, read_walls
+from ..io import Overview, check_target, read_box, read_overview, read_snapshot, read_walls_of
 from ..io.trajectory_file import FORMAT
 from ..metrics import kinetic_energy
+from ..report.body_rows import body_rows
 from ..report.force_rows import force_rows
 from ..report.settings import scene_rows
 from .options import add_json_option, bytes_told, print_rows, write_json
@@ -55,8 +56,9 @@ def _show(options) -> int:
     if options.figure is not None:
         from ..plotting import save, snapshot_figure  # matplotlib takes its time to load
 
-        around = {"walls": read_walls(options.file), "box": read_box(options.file)}
-        drawn = snapshot_figure(*read_snapshot(options.file), **around)
+        time, snapshot = read_snapshot(options.file)
+        walls = read_walls_of(options.file, snapshot)
+        drawn = snapshot_figure(time, snapshot, walls=walls, box=read_box(options.file))
         save(drawn, options.figure)
         rows["figure"] = str(options.figure)
     print_rows(rows)
@@ -117,6 +119,7 @@ def rows_of(overview: Overview, measures: dict[str, Any]) -> dict[str, str]:
         rows["density"] = f"{low:.5g} to {high:.5g} kg/m^3 ({some})"
         rows["largest speed"] = f"{measures['highest_speed']:.4g} m/s ({some})"
     rows |= force_rows(overview)
+    rows |= body_rows(overview)
     if "run_seconds" in overview.metadata:
         rows["run"] = f"{overview.metadata['run_seconds']:.3g} s"
     rows["versions"] = ", ".join(f"{name} {text}" for name, text in overview.versions.items())

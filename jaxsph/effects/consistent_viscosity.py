@@ -88,7 +88,16 @@ class ConsistentViscosity(Effect):
         return {"sharp_trace": sums["sharp_trace"], "linear_part": linear}
 
     def on_walls(self, context, fields, surface):
-        """What walls that turn feel beside mu du/dn, their own velocity being no uniform one."""
+        """What walls that turn feel beside mu du/dn, their own velocity being no uniform one.
+
+        Raises:
+            ValueError: where bodies are free, whose turn is not known beforehand.
+        """
+        if context.bodies is not None and context.bodies.free is not None:
+            raise ValueError(
+                "effects: ConsistentViscosity does not know the torque on bodies that are free; "
+                "list LaminarViscosity instead."
+            )
         return surface.turned(self.viscosity * context.fluid.reference_density)
 
     def rate_terms(self, context):

@@ -22,6 +22,7 @@ class FaultCode(IntEnum):
     ENERGY_OUT_OF_BOUNDS = 7
     STEPS_EXHAUSTED = 8
     CLUMPED = 9
+    BODY_MET_WALL = 10
 
 
 # what it means, and what to do where nothing more is known
@@ -64,6 +65,10 @@ _EXPLANATIONS = {
         "particles have clumped: two are nearer to one another than a tenth of their spacing",
         "use the consistent scheme, the modes' own advection, a map that keeps quadratic fields or "
         "other modes",
+    ),
+    FaultCode.BODY_MET_WALL: (
+        "a free body met a wall or another body, and contact is not modelled",
+        "end the run before, or leave more room around the body",
     ),
 }
 

@@ -1,5 +1,9 @@
 """Files: trajectories in HDF5, and what ParaView reads."""
 
+from .body_shapes import BodyShapes as BodyShapes
+from .body_shapes import read_body_shapes as read_body_shapes
+from .body_shapes import read_walls_of as read_walls_of
+from .body_shapes import walls_with_bodies as walls_with_bodies
 from .growing_file import check_target as check_target
 from .growing_file import unwritable as unwritable
 from .lock import Lock as Lock

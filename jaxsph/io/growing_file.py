@@ -11,7 +11,7 @@ from pathlib import Path
 
 import h5py
 
-from .trajectory_file import LOADS, UNITS, TrajectoryFileError
+from .trajectory_file import BODIES, LOADS, UNITS, TrajectoryFileError
 
 # gzip takes a third longer to write than lzf (6 against 4.5 ms a snapshot of 4096 particles) and
 # saves a sixth instead of a tenth; any HDF5 reads it.
@@ -84,7 +84,8 @@ def add_dataset(file, name, shape, dtype, **options) -> h5py.Dataset:
         chunks=(1, *shape) if shape else (256,),
         **options,
     )
-    dataset.attrs["unit"] = (UNITS | LOADS)[name.partition("/")[0]]
+    kind, _, part = name.partition("/")
+    dataset.attrs["unit"] = BODIES[part] if kind == "bodies" else (UNITS | LOADS)[kind]
     return dataset
 
 

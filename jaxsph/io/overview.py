@@ -10,12 +10,14 @@ from typing import Any
 
 from ..schedule import Schedule
 from ..trajectory import Snapshot
+from .body_shapes import told_bodies
 from .recorded_forces import told
 from .trajectory_file import (
     FIELDS,
     TrajectoryFileError,
     opened,
     patient,
+    read_bodies,
     read_loads,
     schedule_of,
 )
@@ -41,6 +43,7 @@ class Overview:
         forces: on each part of the walls, by name: force [N] and torque [N m] of the last snapshot
             and in the mean over the last fifth of what is there, drag and lift coefficients of that
             mean, and what they refer to.
+        bodies: of each free body its last state, and the lowest and highest place of its centre.
     """
 
     scene: str
@@ -59,6 +62,7 @@ class Overview:
     dtype: str
     size: int
     forces: dict[str, dict[str, Any]]
+    bodies: tuple[dict[str, Any], ...] = ()
 
 
 @patient
@@ -88,6 +92,7 @@ def read_overview(path: str | os.PathLike) -> Overview:
             dtype=str(file["position"].dtype),
             size=path.stat().st_size,
             forces=told(file, count),
+            bodies=told_bodies(file, count),
         )
 
 
@@ -108,5 +113,5 @@ def read_snapshot(path: str | os.PathLike, number: int = -1) -> tuple[float, Sna
         number %= count
         coordinates = file["coordinates"][number] if "coordinates" in file else None
         fields = (file[name][number] for name in FIELDS)
-        loads = read_loads(file, number)
-        return float(file["time"][number]), Snapshot(*fields, coordinates=coordinates, **loads)
+        more = {**read_loads(file, number), "bodies": read_bodies(file, number)}
+        return float(file["time"][number]), Snapshot(*fields, coordinates=coordinates, **more)

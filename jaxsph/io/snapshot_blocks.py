@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..trajectory import Trajectory
-from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, read_loads
+from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, read_bodies, read_loads
 
 
 def snapshot_blocks(path: str | os.PathLike, size: int, every: int = 1) -> Iterator[Trajectory]:
@@ -46,8 +46,8 @@ def snapshot_blocks(path: str | os.PathLike, size: int, every: int = 1) -> Itera
                 )
             fields = {name: file[name][block] for name in ("time", *FIELDS)}
             coordinates = file["coordinates"][block] if "coordinates" in file else None
-            loads = read_loads(file, block)
-            return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **loads)
+            more = {**read_loads(file, block), "bodies": read_bodies(file, block)}
+            return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **more)
 
     starts = range(0, count, size * every)
     return (patient(functools.partial(read, start=start))(path) for start in starts)

@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..body_state import BodyState
 from ..content import differences
 from ..domain import Box
 from ..particles import ParticleState
@@ -35,6 +36,8 @@ UNITS = {
 }
 # groups of a dataset for each part of the walls
 LOADS = {"forces": "N", "torques": "N m", "mean_forces": "N", "mean_torques": "N m"}
+# datasets of the group `bodies`, a row for each free body
+BODIES = {"position": "m", "angle": "rad", "velocity": "m/s", "spin": "rad/s"}
 FIELDS = ("position", "velocity", "density", "pressure")
 _ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -118,8 +121,8 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
             metadata["steps"] = int(file["step"][count - 1])
         fields = {name: file[name][:count] for name in ("time", *FIELDS)}
         coordinates = file["coordinates"][:count] if "coordinates" in file else None
-        loads = read_loads(file, slice(count))
-        return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **loads)
+        more = {**read_loads(file, slice(count)), "bodies": read_bodies(file, slice(count))}
+        return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **more)
 
 
 def read_walls(path: str | os.PathLike) -> np.ndarray | None:
@@ -165,7 +168,7 @@ def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpo
             count = count_up_to(path, file["step"][:count], step)
         if count:
             position, velocity, density, _ = (file[name][count - 1] for name in FIELDS)
-            state = ParticleState(position, velocity, density)
+            state = ParticleState(position, velocity, density, read_bodies(file, count - 1))
         return Checkpoint(
             scene=_text(file.attrs["scene"]),
             parameters=json.loads(_text(file.attrs["parameters"])),
@@ -181,6 +184,7 @@ def growing(file: h5py.File) -> list[str]:
     """The datasets that have a row for each snapshot."""
     fields = [name for name in UNITS if name in file]
     loads = [f"{kind}/{name}" for kind in LOADS if kind in file for name in file[kind]]
+    loads += [f"bodies/{name}" for name in BODIES if "bodies" in file]
     return fields + [name for name in loads if name != "forces/time"]  # the time itself, linked
 
 
@@ -189,9 +193,16 @@ def read_loads(file: h5py.File, rows: int | slice) -> dict[str, dict[str, np.nda
     found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in LOADS}
     for path in growing(file):
         kind, _, name = path.partition("/")
-        if name:
+        if name and kind in LOADS:
             found[kind][name] = file[path][rows]
     return found
+
+
+def read_bodies(file: h5py.File, rows: int | slice) -> BodyState | None:
+    """The free bodies of some snapshots; None where there are none."""
+    if "bodies" not in file:
+        return None
+    return BodyState(**{name: file[f"bodies/{name}"][rows] for name in BODIES})
 
 
 def schedule_of(file: h5py.File) -> Schedule:

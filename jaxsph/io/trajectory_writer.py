@@ -22,10 +22,12 @@ from ..environment import versions
 from ..record import plain
 from ..trajectory import Snapshot
 from ..wall_forces import WallForces
+from .body_shapes import begin_shapes
 from .growing_file import COMPRESSION, abandon, add_dataset, begin, check_target, unwritable
 from .lock import Lock
 from .recorded_forces import begin_forces, link_time, sum_up
 from .trajectory_file import (
+    BODIES,
     FORMAT,
     LOADS,
     SCHEMA_VERSION,
@@ -137,6 +139,10 @@ class TrajectoryWriter:
             walls = getattr(scene, "walls", None)
             if walls is not None:
                 file.create_group("walls")["position"] = np.float32(walls.fixed_position)
+                begin_shapes(file, walls)
+            for name in () if state.bodies is None else BODIES:
+                like = np.asarray(getattr(state.bodies, name))
+                add_dataset(file, f"bodies/{name}", like.shape, like.dtype)
             loads = ("", forces), ("mean_", averaged)
             for prefix, each in (pair for pair in loads if pair[1] is not None):
                 dim, dtype = shapes["position"][1], np.dtype(state.position.dtype)
@@ -201,7 +207,7 @@ class TrajectoryWriter:
                 file.attrs.modify("metadata", np.bytes_(_to_json(metadata)))
                 rows = growing(old)
                 for name in old:
-                    if name not in (*UNITS, *LOADS):
+                    if name not in (*UNITS, *LOADS, "bodies"):
                         old.copy(name, file)
                 for name in rows:
                     like = old[name]
@@ -230,6 +236,8 @@ class TrajectoryWriter:
         for kind in LOADS:
             loads = getattr(snapshot, kind).items()
             fields |= {f"{kind}/{name}": value for name, value in loads}
+        for name in () if snapshot.bodies is None else BODIES:
+            fields[f"bodies/{name}"] = getattr(snapshot.bodies, name)
         self._tried(lambda: self._store({**fields, "time": time, "step": step}))
         self._count, self.last_step, self.last_time = self._count + 1, step, time
 

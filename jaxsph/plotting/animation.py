@@ -13,8 +13,17 @@ import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
+from ..body_state import BodyState
 from ..domain import Box
-from ..io import check_target, read_box, read_walls, snapshot_blocks
+from ..io import (
+    BodyShapes,
+    check_target,
+    read_body_shapes,
+    read_box,
+    read_walls,
+    snapshot_blocks,
+    walls_with_bodies,
+)
 from ..trajectory import Trajectory
 from .fields import VELOCITY, ParticleField
 from .images import fit_box, with_images
@@ -56,7 +65,10 @@ def animate(
             the picture's folder does not serve.
     """
     blocks, walls, box = partial(snapshot_blocks, source, 1), read_walls(source), read_box(source)
-    return draw_animation(blocks, path, field, every, frames_per_second, progress, walls, box)
+    shapes = read_body_shapes(source)
+    return draw_animation(
+        blocks, path, field, every, frames_per_second, progress, walls, box, shapes
+    )
 
 
 def draw_animation(
@@ -68,9 +80,11 @@ def draw_animation(
     progress: Callable[[int], None] | None = None,
     walls: np.ndarray | None = None,
     box: Box | None = None,
+    shapes: BodyShapes | None = None,
 ) -> Path:
     """As `animate`, of the snapshots that `snapshots(every)` gives one by one, each time anew, with
-    walls whose ghosts are at given places (G, n) [m], and in a box that may be periodic."""
+    walls whose ghosts are at given places (G, n) [m], in a box that may be periodic, and with free
+    bodies of given shapes."""
     path = Path(path)
     if path.suffix not in _WRITERS:
         raise ValueError(f"{path}: pictures end with {' or '.join(_WRITERS)}; name it so.")
@@ -84,14 +98,16 @@ def draw_animation(
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
         with matplotlib.rc_context(settings):
-            _draw(blocks, writer, part, field, view, progress, walls, box)
+            _draw(blocks, writer, part, field, view, progress, walls, box, shapes)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
     return path
 
 
-def _draw(blocks, writer: AbstractMovieWriter, path, field, view: _View, progress, walls, box):
+def _draw(
+    blocks, writer: AbstractMovieWriter, path, field, view: _View, progress, walls, box, shapes
+):
     """All frames into a picture."""
     first = next(blocks)
     corners = np.stack([view.low, view.high])
@@ -107,11 +123,12 @@ def _draw(blocks, writer: AbstractMovieWriter, path, field, view: _View, progres
         ylim=(view.low[1] - margin, view.high[1] + margin),
     )
     fit_box(axes, box)
-    still, reach = draw_walls(axes, walls), 2.0 * margin
+    around = walls_with_bodies(walls, shapes, _bodies(first))
+    still, reach = draw_walls(axes, around), 2.0 * margin
     label_panel(figure, axes, squares, field.label, extend="both")
     title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
     fit_squares(figure, [(axes, squares, *still)])
-    figure.set_layout_engine("none")  # nothing moves but the particles
+    figure.set_layout_engine("none")  # nothing moves but particles and bodies
     with writer.saving(figure, str(path), _DPI):
         block = first
         while block is not None:
@@ -119,11 +136,17 @@ def _draw(blocks, writer: AbstractMovieWriter, path, field, view: _View, progres
             position, index = with_images(position, box, reach)
             squares.set_offsets(position)
             squares.set_array(value[index])
+            for grey in still:
+                grey.set_offsets(walls_with_bodies(walls, shapes, _bodies(block)))
             title.set_text(view.title(block))
             writer.grab_frame()
             if progress is not None:
                 progress(1)
             block = next(blocks, None)
+
+
+def _bodies(block: Trajectory) -> BodyState | None:
+    return block.snapshot(0).bodies
 
 
 def _shown(block: Trajectory, field: ParticleField) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import to_hex
 
-from ..io import read_box, read_overview, read_walls, snapshot_blocks
+from ..io import read_body_shapes, read_box, read_overview, read_walls, snapshot_blocks
 from ..plotting import FIELDS, ParticleField
 from ..plotting.images import with_images
 from ..plotting.particles import OVERLAP, middle_layer, spacing
@@ -37,16 +37,21 @@ def film(source: str | os.PathLike) -> str:
     room = max(2, _BYTES // (overview.particles * (4 + len(fields))))
     every = -(-overview.snapshots // min(FRAMES, room))
     times, places, values = [], [], [[] for _ in fields]
-    box, reach = read_box(source), None
+    box, shapes, reach = read_box(source), read_body_shapes(source), None
     for block in snapshot_blocks(source, 1, every):
         shown = middle_layer(block.position[0])
         times.append(float(block.time[0]))
         place = np.asarray(block.position[0][shown, :2], np.float32)
         reach = spacing(place) if reach is None else reach
         place, index = with_images(place, box, reach)
-        places.append(place)
+        solid = np.zeros((0, 2), np.float32)  # free bodies, grey as what has no value
+        if shapes is not None:
+            solid = np.float32(shapes.places(block.snapshot(0).bodies))
+        places.append(np.concatenate([place, solid]))
+        grey = np.full(len(solid), np.nan, np.float32)
         for kept, field in zip(values, fields, strict=True):
-            kept.append(np.asarray(field.value(block)[0][shown][index], np.float32))
+            value = np.asarray(field.value(block)[0][shown][index], np.float32)
+            kept.append(np.concatenate([value, grey]))
     walls = read_walls(source)
     walls = walls if walls is not None and walls.shape[1] == 2 else np.zeros((0, 2), np.float32)
     return _piece(times, places, values, fields, walls, box)

@@ -7,7 +7,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import final
 
-from ..io import read_box, read_overview, read_snapshot, read_walls
+from ..io import read_box, read_overview, read_snapshot, read_walls_of
 from ..plotting import FIELDS, ParticleField, snapshot_figure
 from ..plotting.style import png
 from . import page
@@ -52,7 +52,11 @@ class LivePage:
         if count != self._drawn[0]:  # drawing takes its time
             time, snapshot = read_snapshot(self.source, count - 1)
             drawn = snapshot_figure(
-                time, snapshot, self.fields, read_walls(self.source), read_box(self.source)
+                time,
+                snapshot,
+                self.fields,
+                read_walls_of(self.source, snapshot),
+                read_box(self.source),
             )
             self._drawn = count, page.figure(png(drawn), f"Snapshot {count}, t = {time:g} s.")
         return overview.complete, [self._drawn[1], page.rows(self.rows())]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..history import energy_unit, read_history
-from ..io import read_box, read_forces, read_overview, read_snapshot, read_walls
+from ..io import read_box, read_forces, read_overview, read_snapshot, read_walls_of
 from ..plotting import depth_figure, forces_figure, history_figure, snapshot_figure
 from ..plotting.style import png
 from ..trajectory import Snapshot
@@ -49,7 +49,7 @@ def write_run_report(
     if overview.snapshots:
         history = read_history(trajectory, overview.particles, mass)
         time, snapshot = read_snapshot(trajectory)
-        walls = read_walls(trajectory)
+        walls = read_walls_of(trajectory, snapshot)
         layer = ", of the middle layer" if overview.dim == 3 else ""
         pieces += [
             page.heading("The run"),

@@ -11,6 +11,7 @@ from .cylinder import cylinder as cylinder
 from .dam_break import dam_break as dam_break
 from .elliptic_drop import elliptic_drop as elliptic_drop
 from .enclosed import enclosed_flow as enclosed_flow
+from .floating_box import floating_box as floating_box
 from .flow_through import flow_through as flow_through
 from .gresho_vortex import gresho_vortex as gresho_vortex
 from .hydrostatic_tank import hydrostatic_tank as hydrostatic_tank
@@ -28,6 +29,7 @@ from .shear_layer import shear_layer as shear_layer
 from .sloshing import sloshing as sloshing
 from .solution import Solution as Solution
 from .standing_wave import standing_wave as standing_wave
+from .taylor_couette import taylor_couette as taylor_couette
 from .taylor_green import taylor_green as taylor_green
 from .taylor_green import taylor_green_3d as taylor_green_3d
 
@@ -51,4 +53,6 @@ SCENES = {
     "shear-layer": shear_layer,
     "sloshing": sloshing,
     "standing-wave": standing_wave,
+    "floating-box": floating_box,
+    "taylor-couette": taylor_couette,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -67,6 +68,9 @@ class Scene(eqx.Module):
 
     def __post_init__(self):
         dtype = self.state.position.dtype
+        free = None if self.walls is None else self.walls.free
+        if free is not None and self.state.bodies is None:
+            self.state = dataclasses.replace(self.state, bodies=free.state)
         for name in ("effects", "fluid", "state", "walls"):
             setattr(self, name, in_dtype(getattr(self, name), dtype))
         self.time_step, self.end_time = float(self.time_step), float(self.end_time)
@@ -92,7 +96,8 @@ class Scene(eqx.Module):
             raise ValueError(
                 f"time step: {self.time_step:g} s is beyond the stability limit of {limit:.4g} s "
                 "(the least of 1.5 h/c0, 0.125 h^2/nu, that of particles which start close to a "
-                "wall, and the limits of other effects); choose one below it."
+                "wall, and the limits of other effects; the first is shorter where a free body is "
+                "light); choose one below it."
             )
         schedule = self.schedule
         if abs(schedule.end_time - self.end_time) > 1e-6 * self.end_time:
@@ -125,8 +130,11 @@ class Scene(eqx.Module):
 
     @property
     def stable_time_step(self) -> float:
-        """The largest stable step [s]: acoustic CFL of the paper, and those of its effects."""
+        """The largest stable step [s]: acoustic CFL of the paper, less where a free body is light,
+        and those of its effects."""
         acoustic = CFL * self.space.smoothing_length / float(self.fluid.sound_speed)
+        if self.walls is not None and self.walls.free is not None:
+            acoustic *= float(self.walls.free.step_share(self.fluid.reference_density))
         of_all = self.fluid, self.space
         limits = [float(effect.step_limit(*of_all)) for effect in self.effects]
         start = [effect.step_limit_from(self.state.position, *of_all) for effect in self.effects]

@@ -1,5 +1,6 @@
 """Solid walls: where they are, and the ghost particles that stand for them."""
 
+from .free_body import FreeBody as FreeBody
 from .geometry_files import outline_from_file as outline_from_file
 from .geometry_files import solid_from_file as solid_from_file
 from .moving_body import Bodies as Bodies

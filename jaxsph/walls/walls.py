@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 from typing import final
 
 import equinox as eqx
@@ -15,15 +15,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..body_state import BodyState
 from ..pairs import Space
+from .free_body import FreeBodies, FreeBody, checked
 from .moving_body import Bodies, MovingBody
 from .parts import WallPart
+from .refusals import place, refuse_gaps, refuse_thin_walls, refuse_torn_walls
 from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
-_PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
-_TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
 
 
 @final
@@ -69,6 +70,7 @@ class Walls(eqx.Module):
         layers: int | None = None,
         bodies: Sequence[MovingBody] = (),
         parts: Sequence[WallPart] = (),
+        free_bodies: Sequence[FreeBody] = (),
     ) -> Walls:
         """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
 
@@ -81,6 +83,7 @@ class Walls(eqx.Module):
             bodies: that are moved through that region. Where one meets a fixed wall it must reach
                 the kernel's support deep into the region, and should stay that far in.
             parts: of the walls, moving bodies among them, whose forces are recorded by name.
+            free_bodies: that the fluid moves, in two dimensions; as far from fixed walls as above.
 
         Raises:
             ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
@@ -103,20 +106,23 @@ class Walls(eqx.Module):
         if layers < 1:
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
         distance = partial(_in_blocks, _distance, fluid_region)
-        _refuse_gaps(distance, space)
-        _refuse_torn_walls(distance, space)
+        refuse_gaps(distance, space)
+        refuse_torn_walls(distance, space)
         lattice = space.lattice(layers)
         depth = distance(lattice)
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
-        if not len(ghosts) and not bodies:
+        moved = (*bodies, *free_bodies)
+        for body in free_bodies:
+            checked(body, space.box)
+        if not len(ghosts) and not moved:
             raise ValueError(
                 "walls: the region of fluid leaves no place for a wall; let the box be closed in "
                 "some direction, or the region smaller than the box."
             )
         normal = _normals(fluid_region, ghosts)
         depth = distance(ghosts)[:, None]
-        _refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
+        refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
         skin = ghosts + (1.0 - _HAIR) * depth * normal
         velocity = np.zeros_like(ghosts)
         for lid in moving:
@@ -135,22 +141,33 @@ class Walls(eqx.Module):
                     "along themselves only."
                 )
         here = [jnp.asarray(a) for a in (ghosts, normal, velocity)]
-        if not bodies:
+        if not moved:
             _check_parts(parts, ghosts)
             return cls(*here, fluid_region, None, tuple(parts))
-        position, normal, owner = _body_ghosts(fluid_region, bodies, space, thickness)
-        owner = jnp.concatenate([jnp.full(len(ghosts), len(bodies)), jnp.asarray(owner)])
-        moved = Bodies.at_start(bodies, owner.astype(jnp.int32), space.box)
+        position, normal, number = _body_ghosts(fluid_region, moved, space, thickness)
+        number = np.concatenate([np.full(len(ghosts), len(moved)), number])
         more = (position, normal, np.zeros_like(position))
         here = [jnp.concatenate([a, jnp.asarray(b)]) for a, b in zip(here, more, strict=True)]
-        here[2] = here[2] + moved.of_ghosts(moved.velocity)
+        free = None
+        if free_bodies:
+            own = (number >= len(bodies)) & (number < len(moved))
+            owner = jnp.asarray(np.where(own, number - len(bodies), len(free_bodies)), jnp.int32)
+            free = FreeBodies.at_start(free_bodies, owner, *here[:2], space)
+            here[2] = here[2] + free.ghost_velocity(*here[:2])
+        owner = jnp.asarray(np.where(number < len(bodies), number, len(bodies)), jnp.int32)
+        start = Bodies.at_start(bodies, owner, space.box, free)
+        here[2] = here[2] + start.of_ghosts(start.velocity)
         _check_parts(parts, np.asarray(here[0]))
-        return cls(*here, fluid_region, moved, tuple(parts))
+        return cls(*here, fluid_region, start, tuple(parts))
 
     @property
     def start_region(self) -> Region:
         """Where fluid may be at t = 0, outside the bodies."""
-        return _without(self.fluid_region, () if self.bodies is None else self.bodies.parts)
+        bodies = self.bodies
+        if bodies is None:
+            return self.fluid_region
+        free = () if bodies.free is None else bodies.free.parts
+        return _without(self.fluid_region, (*bodies.parts, *free))
 
     @property
     def fixed_position(self) -> Float[np.ndarray, "ghosts dim"]:
@@ -158,21 +175,31 @@ class Walls(eqx.Module):
         position = np.asarray(self.position)
         if self.bodies is None:
             return position
-        return position[np.asarray(self.bodies.owner) == len(self.bodies.parts)]
+        fixed = np.asarray(self.bodies.owner) == len(self.bodies.parts)
+        if self.bodies.free is not None:
+            fixed &= np.asarray(self.bodies.free.owner) == len(self.bodies.free.parts)
+        return position[fixed]
 
-    def at(self, time: Float[Array, ""]) -> Walls:
-        """The walls at a time [s]: their bodies' ghosts moved, and their velocities."""
-        if self.bodies is None:
-            return self
-        then = self.bodies.at(time)
-        return Walls(
-            self.position + then.of_ghosts(then.offset - self.bodies.offset),
-            self.normal,
-            self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity),
-            self.fluid_region,
-            then,
-            self.parts,
-        )
+    @property
+    def free(self) -> FreeBodies | None:
+        """The bodies that the fluid moves, if there are any, where they are now."""
+        return None if self.bodies is None else self.bodies.free
+
+    def at(self, time: Float[Array, ""], free: BodyState | None = None) -> Walls:
+        """The walls at a time [s], and their free bodies in a state: their bodies' ghosts moved,
+        and their velocities."""
+        return self if self.bodies is None else self.moved(self.bodies.at(time, free))
+
+    def moved(self, then: Bodies) -> Walls:
+        """The walls with their bodies elsewhere."""
+        position = self.position + then.of_ghosts(then.offset - self.bodies.offset)
+        normal = self.normal
+        velocity = self.velocity + then.of_ghosts(then.velocity - self.bodies.velocity)
+        if then.free is not None:
+            velocity = velocity - self.bodies.free.ghost_velocity(position, normal)
+            position, normal = self.bodies.free.carried(then.free, position, normal)
+            velocity = velocity + then.free.ghost_velocity(position, normal)
+        return Walls(position, normal, velocity, self.fluid_region, then, self.parts)
 
     def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
         """Distance [m] to the nearest wall, negative in the fluid; see `Region`."""
@@ -180,6 +207,19 @@ class Walls(eqx.Module):
         if self.bodies is None:
             return distance
         return jnp.maximum(distance, -self.bodies.signed_distance(position))
+
+    def signed_distance_without(
+        self, number: int, position: Float[Array, "points dim"]
+    ) -> Float[Array, " points"]:
+        """The same for all walls but the free body of that number."""
+        distance, bodies = _distance(self.fluid_region, position), self.bodies
+        others = [k for k in range(len(bodies.free.parts)) if k != number]
+        for other in others:
+            distance = jnp.maximum(distance, -bodies.free.of_body(other, position))
+        if bodies.parts:
+            moved = dataclasses.replace(bodies, free=None)
+            distance = jnp.maximum(distance, -moved.signed_distance(position))
+        return distance
 
     def beyond(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
         """Which particles are inside a wall."""
@@ -223,7 +263,7 @@ def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
     if not np.all(length > 0.5):
         where = ghosts[int(np.argmin(length))]
         raise ValueError(
-            f"walls: the signed distance has no slope at {_at(where)}; its gradient must point "
+            f"walls: the signed distance has no slope at {place(where)}; its gradient must point "
             "away from the fluid everywhere in the wall."
         )
     return normal / length
@@ -248,12 +288,12 @@ def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Spac
             )
         normal = _normals(~body.region, ghosts)
         surface = ghosts + depth[held][:, None] * normal
-        _refuse_thin_walls(wet, space, surface, normal)
+        refuse_thin_walls(wet, space, surface, normal)
         behind = np.asarray(space.box.wrap(jnp.asarray(surface - space.support * normal)))
         shallow = (wet(surface + 0.5 * space.spacing * normal) < 0.0) & (fixed(behind) > 0.0)
         if shallow.any():
             raise ValueError(
-                f"moving body: at {_at(surface[int(np.argmax(shallow))])} a fixed wall is nearer "
+                f"moving body: at {place(surface[int(np.argmax(shallow))])} a fixed wall is nearer "
                 f"behind its face than the kernel's support of {space.support:.3g} m; the fluid "
                 "would feel that wall. Make the body thicker or raise the resolution."
             )
@@ -324,66 +364,3 @@ def _put_off(region: Region, position, margin: float):
     near = (excess > 0.0) & (squared > 0.0)
     move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)
     return position - jnp.where(near[:, None], move[:, None] * outward, 0.0)
-
-
-def _at(point) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
-
-
-def _refuse_gaps(distance, space: Space) -> None:
-    """The fluid must not reach past a closed face of the box."""
-    box = space.box
-    for axis, side in product(range(box.dim), (0, 1)):
-        if box.periodic[axis]:
-            continue
-        face = _face(space, axis, (box.lower, box.upper)[side][axis])
-        depth = distance(face)
-        if depth.min() < -_TOUCH * space.spacing:
-            raise ValueError(
-                f"walls: a gap at {_at(face[int(np.argmin(depth))])}: the fluid reaches past a "
-                "closed face of its box there. Close it with a wall, widen the box, or make that "
-                "direction periodic."
-            )
-
-
-def _refuse_torn_walls(distance, space: Space) -> None:
-    """What is wall on one periodic face of the box must be wall on the other: it is one place."""
-    box, least = space.box, _TOUCH * space.spacing
-    for axis in range(box.dim):
-        if not box.periodic[axis]:
-            continue
-        faces = [_face(space, axis, end[axis]) for end in (box.lower, box.upper)]
-        low, high = (distance(face) for face in faces)
-        torn = ((low > least) & (high < -least)) | ((low < -least) & (high > least))
-        if torn.any():
-            here, there = (face[int(np.argmax(torn))] for face in faces)
-            raise ValueError(
-                f"walls: torn at a periodic face of the box: {_at(here)} and {_at(there)} are one "
-                "place, a wall by the one and fluid by the other. Move the body off the face, or "
-                "join it with its copy a box's length further: body | copy."
-            )
-
-
-def _face(space: Space, axis: int, at: float) -> np.ndarray:
-    """Points of a face of the box, a fraction of a spacing apart."""
-    box, ticks = space.box, []
-    for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
-        count = 1 if k == axis else max(2, round(length / (_PITCH * space.spacing)) + 1)
-        ticks.append(low + np.linspace(0.0, length, count))
-    ticks[axis] = np.asarray([at])
-    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
-
-
-def _refuse_thin_walls(distance, space: Space, surface, normal) -> None:
-    """Fluid on one side of a wall must not be felt on the other, nor by the other's ghosts."""
-    needed = 2.0 * space.support
-    for depth in np.arange(0.25, needed / space.spacing, 0.5) * space.spacing:
-        behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
-        wet = distance(behind) < 0.0
-        if wet.any():
-            raise ValueError(
-                f"walls: the wall at {_at(surface[int(np.argmax(wet))])} is about {depth:.3g} m "
-                f"thick, thinner than twice the kernel's support of {space.support:.3g} m; the "
-                "fluids on its two sides would feel each other. Make it thicker or raise the "
-                "resolution."
-            )

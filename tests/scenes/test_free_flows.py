@@ -43,6 +43,7 @@ SMALL = {
     "dam-break": 50,
     "open-cavity": None,
     "piston-wave-maker": 72,
+    "floating-box": 60,
 }
 EFFECTS = {
     name
@@ -85,7 +86,7 @@ def test_a_scene_compiles_to_the_same_program_without_the_files_of_other_effects
         "effects": ["free_surface", "surface_shifting", "surface_diffusion", "surface_tension",
                     "tensile_control", "artificial_viscosity", "background_pressure"],
         "scenes": ["dam_break", "elliptic_drop", "oscillating_drop", "rotating_square_patch",
-                   "standing_wave", "piston_wave_maker", "shear_layer"],
+                   "standing_wave", "piston_wave_maker", "shear_layer", "floating_box"],
     }  # fmt: skip
     for folder, names in gone.items():
         init = package / folder / "__init__.py"
@@ -235,6 +236,7 @@ def test_settings_out_of_range_are_named(make, options, message):
         "dam-break",
         "standing-wave",
         "piston-wave-maker",
+        "floating-box",
         "sloshing",
         "oscillating-drop",
         "elliptic-drop",

@@ -1,0 +1,70 @@
+"""Tables of bodies that the fluid moves, and of walls that turn."""
+
+from __future__ import annotations
+
+from .table_text import markdown, results, short
+
+
+def floating_box() -> str:
+    """Period of heave and draught of the box."""
+    header = ("particles along the tank", "box let go", "found", "expected", "off", "angle [rad]")
+
+    def line(row):
+        dx = short(row["lift"] / row["spacing"], 2)
+        if row["period"] is None:
+            start, of = "in its place", "draught"
+            found, expected = row["draught"], row["draught"] / (
+                1.0 + row["draught_error_percent"] / 100.0
+            )
+        else:
+            start, of = f"{dx} dx above", "period"
+            found, expected = row["period"], row["linear_period"]
+        unit = "s" if of == "period" else "m"
+        off = short(row[f"{of}_error_percent"], 2)
+        return (
+            str(row["resolution"]), start, f"{of} {short(found, 4)} {unit}",
+            f"{short(expected, 4)} {unit}", f"{off} %", short(row["largest_angle"], 2),
+        )  # fmt: skip
+
+    return markdown(header, (line(row) for row in results("floating_box")))
+
+
+def light_bodies() -> str:
+    """The longest stable steps of light bodies, and how they start to rise."""
+    header = (
+        "scheme", "density / water's", "limit", "stable at", "lost at",
+        "rises at [m/s^2]", "potential flow",
+    )  # fmt: skip
+    return markdown(
+        header,
+        (
+            (
+                row["scheme"],
+                f"{row['ratio']:g}",
+                short(row["limit_share"], 2),
+                short(row["stable_share"], 2),
+                "-" if row["lost_share"] is None else short(row["lost_share"], 2),
+                short(row["acceleration"], 3),
+                short(row["potential_acceleration"], 3),
+            )
+            for row in results("light_bodies")
+        ),
+    )
+
+
+def taylor_couette() -> str:
+    """Torques between cylinders."""
+    header = ("turns", "to the inner radius", "torque, inner", "outer", "velocity")
+    names = ("inner_torque_error_percent", "outer_torque_error_percent", "velocity_error_percent")
+    rows = sorted(results("taylor_couette"), key=lambda row: (row["turns"], row["resolution"]))
+    return markdown(
+        header,
+        (
+            (
+                row["turns"],
+                str(row["resolution"]),
+                *(f"{short(row[name], 2)} %" for name in names),
+            )
+            for row in rows
+        ),
+    )

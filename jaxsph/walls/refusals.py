@@ -1,0 +1,77 @@
+"""Walls that are refused: with gaps, torn at a periodic face, or too thin."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..pairs import Space
+
+_PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
+_TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
+
+
+def place(point) -> str:
+    """A point, as errors tell of it."""
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
+
+
+def refuse_gaps(distance, space: Space) -> None:
+    """The fluid must not reach past a closed face of the box."""
+    box = space.box
+    for axis, side in product(range(box.dim), (0, 1)):
+        if box.periodic[axis]:
+            continue
+        face = _face(space, axis, (box.lower, box.upper)[side][axis])
+        depth = distance(face)
+        if depth.min() < -_TOUCH * space.spacing:
+            raise ValueError(
+                f"walls: a gap at {place(face[int(np.argmin(depth))])}: the fluid reaches past a "
+                "closed face of its box there. Close it with a wall, widen the box, or make that "
+                "direction periodic."
+            )
+
+
+def refuse_torn_walls(distance, space: Space) -> None:
+    """What is wall on one periodic face of the box must be wall on the other: it is one place."""
+    box, least = space.box, _TOUCH * space.spacing
+    for axis in range(box.dim):
+        if not box.periodic[axis]:
+            continue
+        faces = [_face(space, axis, end[axis]) for end in (box.lower, box.upper)]
+        low, high = (distance(face) for face in faces)
+        torn = ((low > least) & (high < -least)) | ((low < -least) & (high > least))
+        if torn.any():
+            here, there = (face[int(np.argmax(torn))] for face in faces)
+            raise ValueError(
+                f"walls: torn at a periodic face of the box: {place(here)} and {place(there)} are "
+                "one place, a wall by the one and fluid by the other. Move the body off the face, "
+                "or join it with its copy a box's length further: body | copy."
+            )
+
+
+def _face(space: Space, axis: int, at: float) -> np.ndarray:
+    """Points of a face of the box, a fraction of a spacing apart."""
+    box, ticks = space.box, []
+    for k, (low, length) in enumerate(zip(box.lower, box.lengths, strict=True)):
+        count = 1 if k == axis else max(2, round(length / (_PITCH * space.spacing)) + 1)
+        ticks.append(low + np.linspace(0.0, length, count))
+    ticks[axis] = np.asarray([at])
+    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, box.dim)
+
+
+def refuse_thin_walls(distance, space: Space, surface, normal) -> None:
+    """Fluid on one side of a wall must not be felt on the other, nor by the other's ghosts."""
+    needed = 2.0 * space.support
+    for depth in np.arange(0.25, needed / space.spacing, 0.5) * space.spacing:
+        behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
+        wet = distance(behind) < 0.0
+        if wet.any():
+            raise ValueError(
+                f"walls: the wall at {place(surface[int(np.argmax(wet))])} is about {depth:.3g} m "
+                f"thick, thinner than twice the kernel's support of {space.support:.3g} m; the "
+                "fluids on its two sides would feel each other. Make it thicker or raise the "
+                "resolution."
+            )
