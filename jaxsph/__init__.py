@@ -18,6 +18,7 @@ from .at_ghosts import Otherwise as Otherwise
 from .at_ghosts import Same as Same
 from .compiler_options import COMPILER_OPTIONS as COMPILER_OPTIONS
 from .compiler_options import platform_options as platform_options
+from .devices import Devices as Devices
 from .domain import Box as Box
 from .fluid import Fluid as Fluid
 from .fluid import LinearEquationOfState as LinearEquationOfState

@@ -108,6 +108,9 @@ class FullModel(Model):
         particle = int(fault.particle)
         return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
+    def over(self, devices):
+        return dataclasses.replace(self, search=self.search.over(devices))
+
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())
 
