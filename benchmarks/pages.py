@@ -14,6 +14,8 @@ from collections.abc import Callable
 from .full_tables import (
     ahead_of_time,
     cavity_of_pysph,
+    device_differences,
+    devices,
     free_flows,
     schemes,
     settled_cavity,
@@ -70,6 +72,8 @@ TABLES: dict[str, Callable[[], str]] = {
         particle_step,
         versions,
         ahead_of_time,
+        devices,
+        device_differences,
         cheapest_settings,
         label_models,
         label_galerkin,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -66,7 +66,8 @@ class Devices:
                 if kind == "cpu"
                 else f"ask for at most {len(found)}"
             )
-            raise ValueError(f"devices: asked for {count}, JAX has {len(found)} ({kind}); {advice}.")
+            has = f"JAX has {len(found)} ({kind})"
+            raise ValueError(f"devices: asked for {count}, {has}; {advice}.")
         return cls(found[:count])
 
     @property
@@ -81,8 +82,6 @@ class Devices:
         """Rows of each device, of so many."""
         return -(-rows // self.count)
 
-    # ------------------------------------------------------------- outside programs
-
     def placed(self, tree: Any) -> Any:
         """Arrays given to the devices: by rows where these divide evenly, else whole to each, for
         a program to divide."""
@@ -93,12 +92,12 @@ class Devices:
 
         return jax.tree.map(put, tree)
 
-    # ------------------------------------------------------------- inside programs
-
+    @partial(jax.jit, static_argnums=0, inline=True)  # outside programs rows divide evenly or not
     def divided(self, tree: Any) -> Any:
         """The same arrays, each device holding its rows."""
         return lax.with_sharding_constraint(tree, self._sharding(Spec(AXIS)))
 
+    @partial(jax.jit, static_argnums=0, inline=True)
     def take(self, field: Array, places: Array) -> Array:
         """Rows of a field by their places, which are all different."""
         whole = lax.with_sharding_constraint(field, self._sharding(Spec()))

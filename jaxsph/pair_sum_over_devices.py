@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import jax.numpy as jnp
+from jax.extend.core import Primitive
+from jax.interpreters import mlir
 from jaxtyping import Array
 
 from .devices import Devices
+
+
+def lowered(pair_sum: Primitive, alone: Callable) -> Callable:
+    """How the primitive is lowered, `alone` being how it is on one device."""
+
+    def lower(context, *arguments, devices, **parameters):
+        if devices is None:
+            return alone(context, *arguments, **parameters)
+        shared = partial(sums_over_devices, pair_sum.bind, devices=devices)
+        return mlir.lower_fun(shared)(context, *arguments, **parameters)
+
+    return lower
 
 
 def sums_over_devices(

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from types import SimpleNamespace
 
 import jax
@@ -39,7 +39,7 @@ from .domain import Box
 from .kernels import Kernel
 from .neighbors import VerletList, WallPairs
 from .pair_derivatives import Linearised, Transposed, replaced
-from .pair_sum_over_devices import sums_over_devices, without_others
+from .pair_sum_over_devices import lowered, without_others
 from .vector import Vector
 
 _SLOTS_PER_CHUNK = 120_000  # rows times neighbour slots worked on at a time (measured)
@@ -385,24 +385,12 @@ def _batch(arguments, axes, *, mapped, **same):
     return list(outputs), [0] * len(outputs)
 
 
-def lowered(alone: Callable) -> Callable:
-    """How a pair sum is lowered, `alone` being how it is on one device."""
-
-    def lower(context, *arguments, devices, **parameters):
-        if devices is None:
-            return alone(context, *arguments, **parameters)
-        whole = partial(sums_over_devices, pair_sum_p.bind, devices=devices)
-        return mlir.lower_fun(whole)(context, *arguments, **parameters)
-
-    return lower
-
-
 pair_sum_p.def_impl(
     jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped", "devices"))
 )
 pair_sum_p.def_abstract_eval(_abstract)
-mlir.register_lowering(pair_sum_p, lowered(mlir.lower_fun(_one_by_one)))
-mlir.register_lowering(pair_sum_p, lowered(pair_sum_on_gpu.lower), platform="cuda")
+mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, mlir.lower_fun(_one_by_one)))
+mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, pair_sum_on_gpu.lower), platform="cuda")
 ad.primitive_jvps[pair_sum_p] = _jvp
 ad.primitive_transposes[pair_sum_p] = _transpose
 batching.primitive_batchers[pair_sum_p] = _batch
