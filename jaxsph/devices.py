@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -30,7 +30,8 @@ class Devices:
         every: the devices; all of one kind.
 
     Raises:
-        ValueError: if there is none, one stands there twice, or they are of several kinds.
+        ValueError: if there is none, something else stands there, one stands there twice, or they
+            are of several kinds.
 
     Examples:
         >>> import jax
@@ -42,7 +43,11 @@ class Devices:
     every: tuple[jax.Device, ...]
 
     def __post_init__(self):
+        if not isinstance(self.every, Iterable):
+            raise ValueError(f"devices: got {self.every}; give a sequence, as jax.devices().")
         object.__setattr__(self, "every", tuple(self.every))
+        if not all(isinstance(device, jax.Device) for device in self.every):
+            raise ValueError(f"devices: got {self.every}; give devices, as jax.devices().")
         if not self.every:
             raise ValueError("devices: got none; give at least one, as jax.devices().")
         if len(set(self.every)) < len(self.every):
@@ -78,6 +83,9 @@ class Devices:
     def mesh(self) -> Mesh:
         return Mesh(np.asarray(self.every), (AXIS,))
 
+    def __iter__(self) -> Iterator[jax.Device]:
+        return iter(self.every)
+
     def share(self, rows: int) -> int:
         """Rows of each device, of so many."""
         return -(-rows // self.count)
@@ -98,9 +106,14 @@ class Devices:
         return lax.with_sharding_constraint(tree, self._sharding(Spec(AXIS)))
 
     @partial(jax.jit, static_argnums=0, inline=True)
+    def whole(self, tree: Any) -> Any:
+        """The same arrays, each device holding all of them."""
+        return lax.with_sharding_constraint(tree, self._sharding(Spec()))
+
+    @partial(jax.jit, static_argnums=0, inline=True)
     def take(self, field: Array, places: Array) -> Array:
         """Rows of a field by their places, which are all different."""
-        whole = lax.with_sharding_constraint(field, self._sharding(Spec()))
+        whole = self.whole(field)
         return self.divided(whole.at[places].get(mode="promise_in_bounds", unique_indices=True))
 
     def filled(self, field: Array, value: Any = 1) -> Array:

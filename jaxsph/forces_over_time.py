@@ -80,6 +80,9 @@ class ForcesOverTime(Model):
         rates = functional.rates(context, fields, sums, auxiliary)
         return WithImpulse(rates, loads_of(self.forces, functional, passed, auxiliary))
 
+    def over(self, devices):
+        return dataclasses.replace(self, model=self.model.over(devices))
+
     def at(self, time):
         return dataclasses.replace(self, model=self.model.at(time))
 

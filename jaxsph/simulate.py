@@ -70,7 +70,7 @@ def simulate(
     measure: Measure | None = None,
     averaged: WallForces | None = None,
     watch: Watch | None = None,
-    devices: Sequence[jax.Device] | None = None,
+    devices: Sequence[jax.Device] | Devices | None = None,
 ) -> Trajectory:
     """Integrate a model and return its snapshots, the first being the state given.
 
@@ -122,7 +122,7 @@ def simulate(
             f"of intervals of {each} steps."
         )
     if devices is not None:
-        shared = Devices(tuple(devices))
+        shared = Devices(devices)
         model, state = model.over(shared), shared.placed(state)
     dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
     dt = jnp.asarray(time_step, dtype)

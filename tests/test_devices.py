@@ -119,6 +119,10 @@ def test_what_is_no_set_of_devices_is_refused():
         jaxsph.Devices(())
     with pytest.raises(ValueError, match="devices: one stands there twice"):
         jaxsph.Devices((device, device))
+    for no_devices in (4, "cpu", [0]):
+        with pytest.raises(ValueError, match="devices: got .*; give .*, as jax.devices"):
+            jaxsph.Devices(no_devices)
+    assert tuple(jaxsph.Devices([device])) == (device,)
     with pytest.raises(ValueError, match="asked for 999, JAX has .*device_count=999"):
         jaxsph.Devices.first(999)
 

@@ -62,13 +62,14 @@ class WallPairs(eqx.Module):
         """A field of the particles, in the fluid list's sorted order, at those near walls."""
         if self.devices is None:
             return field.at[self.near].get(mode="promise_in_bounds", unique_indices=True)
-        return self.devices.divided(field.at[self.near].get(mode="clip"))
+        return self.devices.whole(field.at[self.near].get(mode="clip"))
 
     def spread(self, values: Array, count: int) -> Array:
         """Values of the particles near walls as a field of all `count`, zero elsewhere."""
         everywhere = jnp.zeros((count, *values.shape[1:]), values.dtype)
         if self.devices is None:
             return everywhere.at[self.near].set(values, unique_indices=True)
+        values = self.devices.whole(values)
         return self.devices.divided(everywhere.at[self.near].set(values, mode="drop"))
 
     def table(self, near: Array, ghosts: Array) -> Array:
@@ -344,8 +345,8 @@ def _shared_pairs(search: WalledSearch, position) -> tuple[WallPairs, Bool[Array
         )
         overflow = overflow | (most > search.capacity) | (longest > room)
         sides.append(index)
-    near, last = devices.filled(here.order, count), ghosts.order[-1]
-    number = devices.filled(ghosts.order, last)
+    near = devices.whole(devices.filled(here.order, count))  # read in every pass
+    number = devices.filled(ghosts.order, ghosts.order[-1])
     return WallPairs(devices.beside(*sides), near, number, devices), overflow
 
 
