@@ -31,10 +31,12 @@ def found(check, scene, *arguments, soon=True):
     """What a check of `devices_worker.py` finds, run with eight devices."""
     flags = os.environ.get("XLA_FLAGS", "") + " --xla_force_host_platform_device_count=8"
     soon = {"JAX_DISABLE_MOST_OPTIMIZATIONS": "1"} if soon else {}  # a few steps: compiled sooner
+    # programs kept by JAX's compilation cache can hang on a divided CPU (docs/devices.md)
+    kept = {k: v for k, v in os.environ.items() if k != "JAX_COMPILATION_CACHE_DIR"}
     process = subprocess.run(
         [sys.executable, WORKER, check, scene, *map(str, arguments)], capture_output=True,
         text=True, cwd=ROOT, check=False,
-        env={**os.environ, "JAX_PLATFORMS": "cpu", "PYTHONPATH": str(ROOT), "XLA_FLAGS": flags}
+        env={**kept, "JAX_PLATFORMS": "cpu", "PYTHONPATH": str(ROOT), "XLA_FLAGS": flags}
         | soon,
     )  # fmt: skip
     assert process.returncode == 0, process.stderr[-2000:]
