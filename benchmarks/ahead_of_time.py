@@ -31,13 +31,17 @@ from jaxsph.arrangements import Lattice
 from jaxsph.cli import positive_int
 from jaxsph.environment import versions
 from jaxsph.integrate import integrate
+from jaxsph.pair_sum_over_devices import lowered
 from jaxsph.pairs import _one_by_one, pair_sum_p
 from jaxsph.scenes import taylor_green, taylor_green_3d
 
 from .measure import format_rows, write_json
 from .table import command
 
-LOWERINGS = {"chunks": mlir.lower_fun(_one_by_one), "tiles": pair_sum_on_gpu.lower}
+LOWERINGS = {
+    "chunks": lowered(pair_sum_p, mlir.lower_fun(_one_by_one)),
+    "tiles": lowered(pair_sum_p, pair_sum_on_gpu.lower),
+}
 _TARGET = Path(__file__).parent / "h200.txtpb"
 _FREE = {  # nothing to start
     "parameter", "constant", "get-tuple-element", "tuple", "bitcast", "after-all", "iota",

@@ -237,6 +237,50 @@ def ahead_of_time() -> str:
     return markdown(header, lines())
 
 
+def devices() -> str:
+    """What devices tell one another, and what that allows."""
+
+    def line(row: Row) -> tuple[str, ...]:
+        count, seconds = row["particles"], row["seconds_of_a_right_hand_side"]
+        sent = 8 * row["numbers_for_a_right_hand_side"]
+        return (
+            f"{row['scene']}, {count:,}",
+            short(sent / 8),
+            short(row["numbers_for_a_list"]),
+            f"{short(row['list_bytes'] / 1e6)} / {short(row['list_bytes_of_a_device'] / 1e6)}",
+            short(1e6 * seconds / count),
+            short(row["seconds_of_a_list"] / seconds),
+            short(row["seconds_of_its_sort"] / seconds),
+            short(8 * sent * count / seconds / 1e9),
+        )
+
+    header = (
+        "particles", "numbers sent for a right-hand side", "for a list",
+        "list, whole / of a device [MB]", "right-hand side [us a particle]",
+        "a list [right-hand sides]", "its sort", "4 times as fast from [GB/s]",
+    )  # fmt: skip
+    rows = (row for row in results("devices") if row["kind"] == "traffic")
+    return markdown(header, map(line, rows))
+
+
+def device_differences() -> str:
+    """How equal runs over several devices are to those of one."""
+
+    def both(row: Row, name: str) -> str:
+        return f"{short(row['of_devices'][name])} / {short(row['of_another_order'][name])}"
+
+    fields = ("position", "velocity", "density")
+    rows = [row for row in results("devices") if row["kind"] == "differences"]
+    return markdown(
+        ("", *fields, "gradient"),
+        (
+            (f"{row['scene']}, {row['particles']:,}", *(both(row, name) for name in fields),
+             short(row["of_gradient"]))
+            for row in rows
+        ),
+    )  # fmt: skip
+
+
 def _error(row: Row) -> str:
     if row["fault"]:
         return f"lost at {short(row['reached'])} s"

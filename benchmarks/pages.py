@@ -15,6 +15,8 @@ from .body_tables import floating_box, light_bodies, taylor_couette
 from .full_tables import (
     ahead_of_time,
     cavity_of_pysph,
+    device_differences,
+    devices,
     free_flows,
     right_hand_sides,
     schemes,
@@ -73,6 +75,8 @@ TABLES: dict[str, Callable[[], str]] = {
         particle_step,
         versions,
         ahead_of_time,
+        devices,
+        device_differences,
         cheapest_settings,
         label_models,
         label_galerkin,

@@ -19,6 +19,7 @@ from .at_ghosts import Same as Same
 from .body_state import BodyState as BodyState
 from .compiler_options import COMPILER_OPTIONS as COMPILER_OPTIONS
 from .compiler_options import platform_options as platform_options
+from .devices import Devices as Devices
 from .domain import Box as Box
 from .fluid import Fluid as Fluid
 from .fluid import LinearEquationOfState as LinearEquationOfState

@@ -79,6 +79,9 @@ class ForcesOverTime(Model):
         rates = functional.rates_of(passed, auxiliary)
         return WithImpulse(rates, loads_of(self.forces, functional, passed, auxiliary))
 
+    def over(self, devices):
+        return dataclasses.replace(self, model=self.model.over(devices))
+
     def at(self, time):
         return dataclasses.replace(self, model=self.model.at(time))
 

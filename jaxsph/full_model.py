@@ -133,6 +133,9 @@ class FullModel(Model):
             return squeezed
         return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
+    def over(self, devices):
+        return dataclasses.replace(self, search=self.search.over(devices))
+
     def enlarged(self):
         return dataclasses.replace(self, search=self.search.enlarged())
 

@@ -12,7 +12,8 @@ each. The primitive carries its own rules:
   of the two particles exchanged (gathers only, no scatter);
 - batching: a CPU takes members one by one, so that the working set stays in cache, a GPU all at
   once;
-- a GPU has a kernel of its own (`pair_sum_on_gpu.py`).
+- a GPU has a kernel of its own (`pair_sum_on_gpu.py`);
+- several devices make each the sums of its own rows (`pair_sum_over_devices.py`).
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from .domain import Box
 from .kernels import Kernel
 from .neighbors import VerletList, WallPairs
 from .pair_derivatives import Linearised, Transposed, replaced
+from .pair_sum_over_devices import lowered, without_others
 from .vector import Vector
 
 _SLOTS_PER_CHUNK = 120_000  # rows times neighbour slots worked on at a time (measured)
@@ -182,7 +184,8 @@ def pair_sum(
             `volume` among them.
         space: kernel and box.
         neighbors: the list; symmetric, so that sums can be transposed.
-        rows: first row wanted and the one past the last; all if none are given.
+        rows: first row wanted and the one past the last, of each device's where several share them;
+            all if none are given.
 
     Returns:
         for each term's name an array (N,), or (N, k) where the term gives a vector, N counting the
@@ -206,9 +209,14 @@ def pair_sum(
     for name, width in layout:
         columns += [fields[name][:, k] for k in range(width)] if width else [fields[name]]
     function = _Composed(terms, space, layout)
+    devices, count = neighbors.devices, len(columns[0])
+    if devices is not None:
+        columns = [devices.filled(column) for column in columns]
     outputs = pair_sum_p.bind(
-        neighbors.index, *columns, function=function, rows=rows, mapped=()
+        neighbors.index, *columns, function=function, rows=rows, mapped=(), devices=devices
     )
+    if devices is not None and rows is None:
+        outputs = devices.divided([o[:count] for o in outputs])
     sums, start = {}, 0
     for term, width in zip(terms, function.widths(columns[0].dtype), strict=True):
         if width:
@@ -271,7 +279,7 @@ def _evaluate(index, *columns, function, rows):
 
     Where rows are chosen, among them those without a partner, a chunk of such rows is passed over.
     """
-    wanted = slice(*(rows or (None,)))
+    wanted = slice(*(rows or (len(index),)))
 
     def sums(block):
         here, neighbors = block
@@ -312,27 +320,28 @@ def _one_by_one(index, *columns, function, rows, mapped):
     return list(lax.map(member, [arguments[k] for k in mapped]) if mapped else member([]))
 
 
-def _abstract(index, *columns, function, rows, mapped):
+def _abstract(index, *columns, function, rows, mapped, devices):
     probe = [jax.ShapeDtypeStruct((1, 1), c.dtype) for c in columns]
     outputs = jax.eval_shape(lambda *c: function(c, c), *probe)
-    count = index.shape[-2] if rows is None else rows[1] - rows[0]
+    shares = 1 if devices is None else devices.count
+    count = index.shape[-2] if rows is None else shares * (rows[1] - rows[0])
     members = [(index, *columns)[k].shape[0] for k in mapped[:1]]
     return [jax.core.ShapedArray((*members, count), o.dtype) for o in outputs]
 
 
-def _jvp(primals, tangents, *, function, rows, mapped):
+def _jvp(primals, tangents, *, function, mapped, **same):
     _, *columns = primals
     active = tuple(k for k, t in enumerate(tangents[1:]) if type(t) is not ad.Zero)
-    outputs = pair_sum_p.bind(*primals, function=function, rows=rows, mapped=mapped)
+    outputs = pair_sum_p.bind(*primals, function=function, mapped=mapped, **same)
     if not active:
         return outputs, [ad.Zero.from_primal_value(o) for o in outputs]
     linear = Linearised(function, active, len(columns))
     moved = [tangents[1 + k] for k in active]
     mapped += tuple(k for k, a in enumerate(active, len(primals)) if 1 + a in mapped)
-    return outputs, pair_sum_p.bind(*primals, *moved, function=linear, rows=rows, mapped=mapped)
+    return outputs, pair_sum_p.bind(*primals, *moved, function=linear, mapped=mapped, **same)
 
 
-def _transpose(cotangents, index, *columns, function, rows, mapped):
+def _transpose(cotangents, index, *columns, function, rows, mapped, devices):
     primals = columns[: function.count]
     linear = columns[function.count :]
     if any(map(ad.is_undefined_primal, primals)) or not all(map(ad.is_undefined_primal, linear)):
@@ -343,15 +352,14 @@ def _transpose(cotangents, index, *columns, function, rows, mapped):
         flipped = Linearised(function.function, function.active, function.count)
     cotangents = [ad.instantiate_zeros(c) for c in cotangents]
     if rows is not None:  # a sum that was not wanted has no cotangent
-        beyond = (rows[0], index.shape[-2] - rows[1])
-        along = [(0, 0)] * (cotangents[0].ndim - 1) + [beyond]
-        cotangents = [jnp.pad(c, along) for c in cotangents]
+        cotangents = without_others(cotangents, rows, index.shape[-2], devices)
     start = 1 + function.count
     own = tuple(k for k in mapped if k < start)
     every = tuple(range(start, start + len(cotangents))) if mapped else ()
     outputs = pair_sum_p.bind(
-        index, *primals, *cotangents, function=flipped, rows=None, mapped=own + every
-    )
+        index, *primals, *cotangents, function=flipped, rows=None, mapped=own + every,
+        devices=devices,
+    )  # fmt: skip
     outputs = [  # what members share has a share of each
         jnp.sum(o, axis=0) if mapped and k not in mapped else o
         for k, o in enumerate(outputs, start)
@@ -359,28 +367,30 @@ def _transpose(cotangents, index, *columns, function, rows, mapped):
     return [None] * start + outputs
 
 
-def _batch(arguments, axes, *, function, rows, mapped):
+def _batch(arguments, axes, *, mapped, **same):
     moved = [
         a if axis is None else jnp.moveaxis(a, axis, 0)
         for a, axis in zip(arguments, axes, strict=True)
     ]
     new = tuple(k for k, axis in enumerate(axes) if axis is not None)
     if not mapped:
-        outputs = pair_sum_p.bind(*moved, function=function, rows=rows, mapped=new)
+        outputs = pair_sum_p.bind(*moved, mapped=new, **same)
         return outputs, [0] * len(outputs)
 
     def member(own):
         arguments = replaced(moved, new, own)
-        return tuple(pair_sum_p.bind(*arguments, function=function, rows=rows, mapped=mapped))
+        return tuple(pair_sum_p.bind(*arguments, mapped=mapped, **same))
 
     outputs = lax.map(member, [moved[k] for k in new])
     return list(outputs), [0] * len(outputs)
 
 
-pair_sum_p.def_impl(jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped")))
+pair_sum_p.def_impl(
+    jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped", "devices"))
+)
 pair_sum_p.def_abstract_eval(_abstract)
-mlir.register_lowering(pair_sum_p, mlir.lower_fun(_one_by_one, multiple_results=True))
-mlir.register_lowering(pair_sum_p, pair_sum_on_gpu.lower, platform="cuda")
+mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, mlir.lower_fun(_one_by_one)))
+mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, pair_sum_on_gpu.lower), platform="cuda")
 ad.primitive_jvps[pair_sum_p] = _jvp
 ad.primitive_transposes[pair_sum_p] = _transpose
 batching.primitive_batchers[pair_sum_p] = _batch

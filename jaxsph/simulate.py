@@ -6,7 +6,7 @@ import dataclasses
 import logging
 import time as clock
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import equinox as eqx
@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .compiled import compiled
+from .devices import Devices
 from .forces_over_time import ForcesOverTime
 from .integrate import (
     Fault,
@@ -69,6 +70,7 @@ def simulate(
     measure: Measure | None = None,
     averaged: WallForces | None = None,
     watch: Watch | None = None,
+    devices: Sequence[jax.Device] | Devices | None = None,
 ) -> Trajectory:
     """Integrate a model and return its snapshots, the first being the state given.
 
@@ -95,9 +97,13 @@ def simulate(
         watch: time [s] and each new snapshot -> why it is not to be believed, if it is not. The
             run goes on; the first such answer is a warning, and `doubt` in the metadata, with
             `doubt_time` [s].
+        devices: that run a full model together, each its share of the particles and of their
+            neighbours, as `jax.devices()`; results differ by rounding. One device if none are
+            given.
 
     Raises:
-        ValueError: if no whole interval is left to run.
+        ValueError: if no whole interval is left to run, or `devices` are given for a model that one
+            device runs.
         SimulationError: on a fault; all good snapshots have gone to the recorder by then.
 
     Examples:
@@ -115,6 +121,9 @@ def simulate(
             f"first_step: from {first_step} to {schedule.steps} must be a whole, positive number "
             f"of intervals of {each} steps."
         )
+    if devices is not None:
+        shared = Devices(devices)
+        model, state = model.over(shared), shared.placed(state)
     dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
     dt = jnp.asarray(time_step, dtype)
     records, times, metadata = [], [], dict(metadata or {})

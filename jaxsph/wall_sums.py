@@ -75,11 +75,7 @@ def wall_sums(
     near = pair_sum(summed, table, space, pairs, pairs.fluid_rows)
     count = fields["volume"].shape[0]
 
-    def spread(values):
-        everywhere = jnp.zeros((count, *values.shape[1:]), values.dtype)
-        return everywhere.at[pairs.near].set(values, unique_indices=True)
-
-    return {name: spread(values) for name, values in near.items()}
+    return {name: pairs.spread(values, count) for name, values in near.items()}
 
 
 def _table(names, fields, ghosts, pairs: WallPairs) -> dict[str, Array]:
@@ -88,10 +84,10 @@ def _table(names, fields, ghosts, pairs: WallPairs) -> dict[str, Array]:
     for name in dict.fromkeys(n for n in names if n in fields or n in ghosts):
         fluid, ghost = fields.get(name), ghosts.get(name)
         if fluid is not None:
-            fluid = fluid.at[pairs.near].get(mode="promise_in_bounds", unique_indices=True)
+            fluid = pairs.of_near(fluid)
         parts = [(fluid, pairs.near.shape[0]), (ghost, pairs.ghosts.shape[0])]
         like = ghost if fluid is None else fluid
-        table[name] = jnp.concatenate(
-            [jnp.zeros((k, *like.shape[1:]), like.dtype) if a is None else a for a, k in parts]
+        table[name] = pairs.table(
+            *(jnp.zeros((k, *like.shape[1:]), like.dtype) if a is None else a for a, k in parts)
         )
     return table

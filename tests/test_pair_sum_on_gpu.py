@@ -15,6 +15,7 @@ from jax.interpreters import mlir
 from jaxsph import Box, PairTerm, Space, effects, pair_sum, pair_sum_on_gpu
 from jaxsph.kernels import WendlandC2
 from jaxsph.pair_rounding import without_rounding
+from jaxsph.pair_sum_over_devices import lowered
 from jaxsph.pairs import _one_by_one, pair_sum_p
 from jaxsph.scenes import SCENES
 from tests.test_pairs import HARDEST, Case
@@ -31,11 +32,11 @@ def interpreted(*arguments, **parameters):
 
 def computed(rule, function, *arguments):
     """What a function gives where pair sums are lowered by a rule; it must be traced anew."""
-    mlir.register_lowering(pair_sum_p, mlir.lower_fun(rule))
+    mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, mlir.lower_fun(rule)))
     try:
         return jax.jit(lambda *a: function(*a))(*arguments)
     finally:
-        mlir.register_lowering(pair_sum_p, mlir.lower_fun(_one_by_one))
+        mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, mlir.lower_fun(_one_by_one)))
 
 
 def assert_equal(function, *arguments, rule=interpreted):

@@ -12,6 +12,7 @@ from jaxsph_command.config import repeating
 from jaxsph_command.errors import fail
 
 from ..clumping import Clumping
+from ..devices import Devices
 from ..environment import environment
 from ..history import energy_unit
 from ..integrate import Model, SimulationError
@@ -44,6 +45,7 @@ def simulate_and_report(
     if first_step:
         metadata["resumed_from_step"] = first_step
     forces = WallForces.of(scene)
+    devices = None if options.devices is None else Devices.first(options.devices).every
     bar = progress_bar(scene.steps, "step", first_step)
     try:
         with writer, bar:
@@ -59,6 +61,7 @@ def simulate_and_report(
                 measure=forces,
                 averaged=named(forces),
                 watch=Clumping(scene.space),
+                devices=devices,
             )
             writer.finish(trajectory.metadata)
     except SimulationError as error:
@@ -70,6 +73,7 @@ def simulate_and_report(
         return fail("jaxsph", f"interrupted. {_holds(writer)} Go on with --resume.", 130)
     overview = read_overview(writer.path)
     results = {**_results(scene, trajectory, writer.path), "forces": overview.forces}
+    results["devices"] = options.devices or 1
     write_json(options.json, {**results, **environment()})
     rows = {**_rows(results), **force_rows(overview), "trajectory": results["trajectory"]}
     print_rows({**rows, "report": str(_report(options, scene, writer, rows))})
@@ -151,6 +155,8 @@ def _rows(results: dict[str, Any]) -> dict[str, str]:
         "compile": f"{results['compile_seconds']:.3g} s",
         "per particle and step": f"{results['microseconds_per_particle_and_step']:.3g} us",
     }
+    if results["devices"] > 1:
+        rows["devices"] = f"{results['devices']}, each its share of the particles"
     if results["errors"] is not None:
         velocity, energy = results["errors"].values()
         rows["velocity error"] = f"{100.0 * velocity:.3g} % (relative L2, at the end)"

@@ -9,10 +9,11 @@ import jax
 from jaxsph_command.config import NAME, write_config
 from jaxsph_command.errors import Parser
 
+from ..devices import Devices
 from ..io import TrajectoryWriter, check_target
 from ..scenes import SCENES
 from ..wall_forces import WallForces, named
-from .options import STEPPING, add_json_option, margin
+from .options import STEPPING, add_json_option, margin, positive_int
 from .recorded import REPORT, simulate_and_report
 from .resume import add_resume_options, check_resume_options, resume
 from .scene_functions import made, name_of, scene_function, unpacked
@@ -25,6 +26,10 @@ _STEPS_HELP = (
 _MARGIN_HELP = (
     "room in the neighbour list over its need at the start; another one rounds sums otherwise "
     "(default: the scene's)"
+)
+_DEVICES_HELP = (
+    "run by N devices together, each its share of the particles; another N rounds sums otherwise "
+    "(default: one; give it again with --resume)"
 )
 
 
@@ -39,6 +44,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add_scene_options(parser, words)
     add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
+    add("--devices", type=positive_int, metavar="N", help=_DEVICES_HELP)
     add("--out", type=Path, metavar="DIR", help="folder of the results (default: out/SCENE)")
     add_json_option(parser)
     add("--overwrite", action="store_true", help="replace a trajectory.h5 that is there")
@@ -47,6 +53,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
 
 def _run(options) -> int:
     make = options.make or scene_function(options.scene)
+    if options.devices is not None:
+        Devices.first(options.devices)  # are there so many?
     check_resume_options(options, given(options) if options.scene in SCENES else [])
     if options.resume is not None:
         return resume(options, make)

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..devices import Devices
 from .faults import Fault, FaultCode
 
 
@@ -53,6 +54,16 @@ class Model(eqx.Module):
         """What a fault most likely comes from and what to do, told by the last good state on the
         host; None if nothing stands out."""
         return None
+
+    def over(self, devices: Devices) -> Model:
+        """The same model run by several devices together.
+
+        Raises:
+            ValueError: if it knows no way to divide its work.
+        """
+        raise ValueError(
+            f"devices: a {type(self).__name__} is run by one device; leave devices out."
+        )
 
     def enlarged(self) -> Model | None:
         """The same model with more room for neighbours, or None if there is nothing to enlarge."""

@@ -86,12 +86,17 @@ def words_of(capacity: int) -> tuple[int, int]:
 
 
 def flags(
-    grid: CellGrid, here: Sorted, there: Sorted, radius: float, capacity: int
+    grid: CellGrid,
+    here: Sorted,
+    there: Sorted,
+    radius: float,
+    capacity: int,
+    places: Int[Array, " points"] | None = None,
 ) -> UInt32[Array, "points words"]:
     """For each point `here` a bit for each point `there` in the cells around: within the radius?
 
     A run is read as it lies in memory, no point of it is looked up by its number. A point is no
-    neighbour of its own, where both are the same.
+    neighbour of its own, where both are the same, or where its place `there` is given.
     """
     words, bits = words_of(capacity)
     number = jnp.arange(words * bits, dtype=jnp.int32)[None, None, :]
@@ -117,14 +122,16 @@ def flags(
             separation = other - mine[:, axis, None, None]
             squared = squared + grid.box.minimum_image(separation, axis) ** 2
         near = near & (squared < radius**2)
-        if here is there:
+        if same:
             start = runs.start[:, :, None]
             if grid.box.periodic[-1]:
                 start = jnp.where(number < first[:, :, None], start, back[:, :, None])
             near = near & (start + number != place[:, None, None])
         return _pack(near.reshape(near.shape[0], -1, bits))
 
-    places = jnp.arange(here.count, dtype=jnp.int32)
+    same = here is there or places is not None
+    if places is None:
+        places = jnp.arange(here.count, dtype=jnp.int32)
     rows = (here.position, places, here.cell)
     around = stencil(grid.shape[:-1], grid.box.periodic[:-1], grid.reach).shape[1]
     return wide_map(some, rows, max(1, _PAIRS // (around * number.size)))

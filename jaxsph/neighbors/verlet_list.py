@@ -12,9 +12,11 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float, Int
 
+from ..devices import Devices
 from ..domain import Box
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
+from .rows_of_devices import RowsOfDevices
 
 CAPACITY_MARGIN = 1.15  # room in the list over its need at the start; every slot costs time
 RUN_MARGIN = 1.25  # the same for runs of cells
@@ -25,6 +27,9 @@ class VerletList(eqx.Module):
 
     Row k of `index` lists the sorted places of the neighbours of the particle at sorted place k;
     free slots point to k itself, whose separation is zero and so adds nothing to a pair sum.
+
+    Where `devices` share the rows, there are rows up to equal shares, and entries count from the
+    first row of the device that holds them, and round the end.
     """
 
     index: Int[Array, "particles capacity"]
@@ -33,13 +38,18 @@ class VerletList(eqx.Module):
     reference: Float[Array, "particles dim"]
     largest_count: Int[Array, ""]
     cell_overflow: Int[Array, ""]
+    devices: Devices | None = eqx.field(static=True, default=None)
 
     def sort(self, field: Array) -> Array:
         """A per-particle field in the list's cell-sorted order."""
+        if self.devices is not None:
+            return self.devices.take(field, self.order)
         return field.at[self.order].get(mode="promise_in_bounds", unique_indices=True)
 
     def unsort(self, field: Array) -> Array:
         """A field in cell-sorted order back in the particles' own order."""
+        if self.devices is not None:
+            return self.devices.take(field, self.inverse)
         return field.at[self.inverse].get(mode="promise_in_bounds", unique_indices=True)
 
     def largest_motion(self, box: Box, position: Array) -> tuple[Array, Array]:
@@ -52,10 +62,13 @@ class VerletList(eqx.Module):
     def closest(self, box: Box, position: Array) -> tuple[Array, Array]:
         """The least distance [m] between two neighbours, and one of the two."""
         here = self.sort(lax.stop_gradient(position)).T
+        index = self.index
+        if self.devices is not None:
+            index = RowsOfDevices(self.devices, index.shape[0]).whole(index)[: here.shape[1]]
         # axis by axis, so that no array of all pairs is made
-        apart = (box.minimum_image(x[self.index] - x[:, None], k) for k, x in enumerate(here))
+        apart = (box.minimum_image(x[index] - x[:, None], k) for k, x in enumerate(here))
         squared = sum(along * along for along in apart)
-        free = self.index == jnp.arange(here.shape[1], dtype=self.index.dtype)[:, None]
+        free = index == jnp.arange(here.shape[1], dtype=index.dtype)[:, None]
         nearest = jnp.min(jnp.where(free, jnp.inf, squared), axis=1)
         row = jnp.argmin(nearest)
         return jnp.sqrt(nearest[row]), self.order[row]
@@ -75,6 +88,7 @@ class NeighborSearch(eqx.Module):
         skin: extra radius [m]; the list stays valid until a particle has moved half of it.
         capacity: neighbours a particle can have.
         run_capacity: particles that a run of cells can hold, as many as the search reaches over.
+        devices: that share the rows of the list, if several do.
     """
 
     grid: CellGrid = eqx.field(static=True)
@@ -82,6 +96,7 @@ class NeighborSearch(eqx.Module):
     skin: float = eqx.field(static=True)
     capacity: int = eqx.field(static=True)
     run_capacity: int = eqx.field(static=True)
+    devices: Devices | None = eqx.field(static=True, default=None)
 
     @classmethod
     def allocate(
@@ -122,6 +137,10 @@ class NeighborSearch(eqx.Module):
             run_capacity=math.ceil(1.2 * self.run_capacity),
         )
 
+    def over(self, devices: Devices) -> NeighborSearch:
+        """The same search by several devices."""
+        return replace(self, devices=devices)
+
     def largest_motion(self, neighbors: VerletList, position: Array) -> tuple[Array, Array]:
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         return neighbors.largest_motion(self.box, position)
@@ -152,16 +171,25 @@ def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
 @partial(eqx.filter_jit, inline=True)  # one program, where a caller has none of its own
 def _built(search: NeighborSearch, position) -> VerletList:
     position = lax.stop_gradient(position)
-    points, words, largest = search._flag(position)
-    longest = longest_run(search.grid, points, points)
-    places = jnp.arange(points.count, dtype=jnp.int32)
+    grid, room = search.grid, (search.run_capacity, search.capacity)
+    if search.devices is None:
+        points, words, largest = search._flag(position)
+        longest = longest_run(grid, points, points)
+        places = jnp.arange(points.count, dtype=jnp.int32)
+        index = pick(words, grid, points, points, *room)
+    else:
+        points, radius = Sorted.of(grid, position), search.support + search.skin
+        places = jnp.arange(points.count, dtype=jnp.int32)
+        rows = RowsOfDevices.of(search.devices, points.count)
+        index, largest, longest = rows.listed(grid, points, points, radius, *room)
     return VerletList(
-        index=pick(words, search.grid, points, points, search.run_capacity, search.capacity),
+        index=index,
         order=points.order,
         inverse=jnp.zeros_like(places).at[points.order].set(places, unique_indices=True),
         reference=position,
         largest_count=largest,
         cell_overflow=(longest > search.run_capacity).astype(jnp.int32),
+        devices=search.devices,
     )
 
 

@@ -13,9 +13,11 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from ..devices import Devices
 from ..domain import Box
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
+from .rows_of_devices import RowsOfDevices
 from .verlet_list import CAPACITY_MARGIN, RUN_MARGIN, NeighborSearch, VerletList
 
 _FILLED = 0.7  # share of the places near walls that a vessel full of fluid takes, at least
@@ -27,6 +29,10 @@ class WallPairs(eqx.Module):
     Rows 0 to W - 1 of `index` belong to the W particles listed in `near`, all others to the ghosts
     listed in `ghosts`; entries are row numbers. Each pair stands in both rows.
 
+    Where `devices` share the rows, each has first its rows of particles, then those of ghosts, and
+    entries are as in a `VerletList`. Rows up to equal shares have no partner: their `near` is past
+    the last particle, their ghost is the last one once more.
+
     Args:
         index: neighbours of each row; a free slot holds the row's own number.
         near: places, in the fluid list's sorted order, of the particles that may see a wall.
@@ -36,21 +42,53 @@ class WallPairs(eqx.Module):
     index: Int[Array, "rows capacity"]
     near: Int[Array, " near"]
     ghosts: Int[Array, " ghosts"]
+    devices: Devices | None = eqx.field(static=True, default=None)
 
     @property
     def fluid_rows(self) -> tuple[int, int]:
-        return 0, self.near.shape[0]
+        """The first and the one past the last, of each device."""
+        return 0, self.near.shape[0] // self._shares
 
     @property
     def ghost_rows(self) -> tuple[int, int]:
-        return self.near.shape[0], self.index.shape[0]
+        """The first and the one past the last, of each device."""
+        return self.fluid_rows[1], self.index.shape[0] // self._shares
+
+    @property
+    def _shares(self) -> int:
+        return 1 if self.devices is None else self.devices.count
+
+    def of_near(self, field: Array) -> Array:
+        """A field of the particles, in the fluid list's sorted order, at those near walls."""
+        if self.devices is None:
+            return field.at[self.near].get(mode="promise_in_bounds", unique_indices=True)
+        return self.devices.whole(field.at[self.near].get(mode="clip"))
+
+    def spread(self, values: Array, count: int) -> Array:
+        """Values of the particles near walls as a field of all `count`, zero elsewhere."""
+        everywhere = jnp.zeros((count, *values.shape[1:]), values.dtype)
+        if self.devices is None:
+            return everywhere.at[self.near].set(values, unique_indices=True)
+        values = self.devices.whole(values)
+        return self.devices.divided(everywhere.at[self.near].set(values, mode="drop"))
+
+    def table(self, near: Array, ghosts: Array) -> Array:
+        """A field of all rows, of that of the particles near walls and that of the ghosts."""
+        if self.devices is None:
+            return jnp.concatenate([near, ghosts])
+        return self.devices.beside(near, ghosts)
 
     def only(self, held: Bool[Array, " all_ghosts"]) -> WallPairs:
         """The pairs with those ghosts alone, by their numbers."""
         particles = jnp.ones(self.near.shape, bool)
-        row = jnp.concatenate([particles, held[self.ghosts]])
+        row = self.table(particles, held[self.ghosts])
         own = jnp.arange(row.shape[0], dtype=self.index.dtype)[:, None]
-        return replace(self, index=jnp.where(row[self.index] & row[:, None], self.index, own))
+        if self.devices is None:
+            return replace(self, index=jnp.where(row[self.index] & row[:, None], self.index, own))
+        rows = RowsOfDevices(self.devices, row.shape[0])
+        partner = row[rows.whole(self.index)]
+        own = rows.counted(own)
+        return replace(self, index=jnp.where(partner & row[:, None], self.index, own))
 
 
 class WallList(eqx.Module):
@@ -193,6 +231,10 @@ class WalledSearch(eqx.Module):
             ghost_run_capacity=math.ceil(more * self.ghost_run_capacity),
         )
 
+    def over(self, devices: Devices) -> WalledSearch:
+        """The same search by several devices."""
+        return replace(self, fluid=self.fluid.over(devices))
+
     def moved(self, ghosts: Float[Array, "ghosts dim"]) -> WalledSearch:
         """The same search with its ghosts elsewhere [m]."""
         return replace(self, ghosts=lax.stop_gradient(ghosts))
@@ -275,6 +317,10 @@ def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 def _built(search: WalledSearch, position) -> WallList:
     position = lax.stop_gradient(position)
     fluid = search.fluid.build(position)
+    built_at = search.ghosts if search.within_reach is None else None
+    if search.fluid.devices is not None:
+        pairs, overflow = _shared_pairs(search, fluid.sort(position))
+        return WallList(fluid, pairs, overflow, built_at)
     here, ghosts, (seen, seeing), (overflow, _) = search._flag(fluid.sort(position))
     grid, near, count = search.wall_grid, here.order, here.count
     to_ghosts, to_fluid = search.ghost_run_capacity, search.near_run_capacity
@@ -282,8 +328,26 @@ def _built(search: WalledSearch, position) -> WallList:
         pick(seen, grid, here, ghosts, to_ghosts, search.capacity, entry=count),
         pick(seeing, grid, ghosts, here, to_fluid, search.capacity, own=count),
     ])  # fmt: skip
-    built_at = search.ghosts if search.within_reach is None else None
     return WallList(fluid, WallPairs(index, near, ghosts.order), overflow, built_at)
+
+
+def _shared_pairs(search: WalledSearch, position) -> tuple[WallPairs, Bool[Array, ""]]:
+    """Each device's rows of the pairs, and whether there is no room for all."""
+    devices, grid, count = search.fluid.devices, search.wall_grid, position.shape[0]
+    here, ghosts, overflow = search._sorted(position)
+    rows, sides = RowsOfDevices.of(devices, here.count, ghosts.count), []
+    for points, others, room, second in (
+        (here, ghosts, search.ghost_run_capacity, False),
+        (ghosts, here, search.near_run_capacity, True),
+    ):
+        index, most, longest = rows.listed(
+            grid, points, others, search.fluid.support + search.skin, room, search.capacity, second
+        )
+        overflow = overflow | (most > search.capacity) | (longest > room)
+        sides.append(index)
+    near = devices.whole(devices.filled(here.order, count))  # read in every pass
+    number = devices.filled(ghosts.order, ghosts.order[-1])
+    return WallPairs(devices.beside(*sides), near, number, devices), overflow
 
 
 @eqx.filter_jit  # compiled once for scenes alike

@@ -95,6 +95,8 @@ FULL = {
     f"{RUN} --arrangement hexagons": "--arrangement: invalid choice",
     f"{RUN} --seed 4294967296": "--seed: must be from 0",
     f"{RUN} --steps few": "--steps: invalid choice",
+    f"{RUN} --devices 0": "--devices: must be at least 1",
+    f"{RUN} --devices 999": "devices: asked for 999, JAX has",
     f"{RUN} --capacity-margin 0": "--capacity-margin: must be at least 1",
     f"{RUN} --mach quick": "--mach: invalid",
     f"{RUN} --mach 0": "mach",

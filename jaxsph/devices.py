@@ -1,0 +1,169 @@
+"""Several devices that run one simulation together, each its share of the rows of all arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.sharding import Mesh, NamedSharding
+from jax.sharding import PartitionSpec as Spec
+from jaxtyping import Array
+
+AXIS = "particles"
+
+
+@dataclass(frozen=True)
+class Devices:
+    """Devices over which the particles and the neighbour list of one simulation are divided.
+
+    R rows are divided into equal runs of ceil(R / P), one for each of P devices; the last runs may
+    be short or empty, so any number of particles will do. A device lists the neighbours of its own
+    rows and makes their sums; the fields that these read are gathered from all.
+
+    Args:
+        every: the devices; all of one kind.
+
+    Raises:
+        ValueError: if there is none, something else stands there, one stands there twice, or they
+            are of several kinds.
+
+    Examples:
+        >>> import jax
+        >>> import jaxsph
+        >>> jaxsph.Devices(jax.devices()[:1]).share(1000)  # rows of each
+        1000
+    """
+
+    every: tuple[jax.Device, ...]
+
+    def __post_init__(self):
+        if not isinstance(self.every, Iterable):
+            raise ValueError(f"devices: got {self.every}; give a sequence, as jax.devices().")
+        object.__setattr__(self, "every", tuple(self.every))
+        if not all(isinstance(device, jax.Device) for device in self.every):
+            raise ValueError(f"devices: got {self.every}; give devices, as jax.devices().")
+        if not self.every:
+            raise ValueError("devices: got none; give at least one, as jax.devices().")
+        if len(set(self.every)) < len(self.every):
+            raise ValueError(f"devices: one stands there twice in {self.every}; name each once.")
+        kinds = sorted({device.platform for device in self.every})
+        if len(kinds) > 1:
+            raise ValueError(f"devices: got kinds {', '.join(kinds)}; give devices of one kind.")
+
+    @classmethod
+    def first(cls, count: int) -> Devices:
+        """The first so many that JAX has.
+
+        Raises:
+            ValueError: if it has fewer.
+        """
+        found = jax.devices()
+        if count > len(found):
+            kind = found[0].platform
+            advice = (
+                f"set XLA_FLAGS=--xla_force_host_platform_device_count={count} to divide a CPU"
+                if kind == "cpu"
+                else f"ask for at most {len(found)}"
+            )
+            has = f"JAX has {len(found)} ({kind})"
+            raise ValueError(f"devices: asked for {count}, {has}; {advice}.")
+        return cls(found[:count])
+
+    @property
+    def count(self) -> int:
+        return len(self.every)
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        return Mesh(np.asarray(self.every), (AXIS,))
+
+    def __iter__(self) -> Iterator[jax.Device]:
+        return iter(self.every)
+
+    def share(self, rows: int) -> int:
+        """Rows of each device, of so many."""
+        return -(-rows // self.count)
+
+    def placed(self, tree: Any) -> Any:
+        """Arrays given to the devices: by rows where these divide evenly, else whole to each, for
+        a program to divide."""
+
+        def put(a):
+            even = a.ndim and a.shape[0] % self.count == 0
+            return jax.device_put(a, self._sharding(Spec(AXIS) if even else Spec()))
+
+        return jax.tree.map(put, tree)
+
+    @partial(jax.jit, static_argnums=0, inline=True)  # outside programs rows divide evenly or not
+    def divided(self, tree: Any) -> Any:
+        """The same arrays, each device holding its rows."""
+        return lax.with_sharding_constraint(tree, self._sharding(Spec(AXIS)))
+
+    @partial(jax.jit, static_argnums=0, inline=True)
+    def whole(self, tree: Any) -> Any:
+        """The same arrays, each device holding all of them."""
+        return lax.with_sharding_constraint(tree, self._sharding(Spec()))
+
+    @partial(jax.jit, static_argnums=0, inline=True)
+    def take(self, field: Array, places: Array) -> Array:
+        """Rows of a field by their places, which are all different."""
+        whole = self.whole(field)
+        return self.divided(whole.at[places].get(mode="promise_in_bounds", unique_indices=True))
+
+    def filled(self, field: Array, value: Any = 1) -> Array:
+        """A field with rows of a value up to equal shares."""
+        beyond = self.share(len(field)) * self.count - len(field)
+        along = [(0, beyond)] + [(0, 0)] * (field.ndim - 1)
+        return self.divided(jnp.pad(field, along, constant_values=value))
+
+    def beside(self, *fields: Array) -> Array:
+        """One field of several with equal shares: each device its rows of the first, of the second
+        and so on."""
+        parts = [f.reshape(self.count, -1, *f.shape[1:]) for f in fields]
+        joined = jnp.concatenate(parts, axis=1)
+        return self.divided(joined.reshape(-1, *joined.shape[2:]))
+
+    def each(self, function: Callable, given: Sequence[Any], out: Any) -> Callable:
+        """`function` run by each device on its own part of its arguments.
+
+        Args:
+            function: of the parts.
+            given: for each argument the axis of its arrays that is divided, None if all of it goes
+                to each device.
+            out: the same of what it returns, or one for all of that.
+        """
+
+        def specs(axes):
+            along = lambda axis: Spec() if axis is None else Spec(*[None] * axis, AXIS)  # noqa: E731
+            return jax.tree.map(along, axes, is_leaf=lambda axis: axis is None)
+
+        return jax.shard_map(
+            function,
+            mesh=self.mesh,
+            in_specs=specs(tuple(given)),
+            out_specs=specs(out),
+            check_vma=False,
+        )
+
+    def own_rows_first(self, table: Array) -> Array:
+        """Columns (F, share) of a device's rows -> those of all rows (F, R), its own ones first and
+        then in their order, round the end. Within `each`."""
+        whole = lax.all_gather(table, AXIS, axis=1, tiled=True)
+        return jnp.roll(whole, -self.number() * table.shape[1], axis=1)
+
+    def number(self) -> Array:
+        """Which device this one is. Within `each`."""
+        return lax.axis_index(AXIS)
+
+    def largest(self, value: Array) -> Array:
+        """The largest of all devices. Within `each`."""
+        return lax.pmax(value, AXIS)
+
+    def _sharding(self, spec: Spec) -> NamedSharding:
+        return NamedSharding(self.mesh, spec)
