@@ -13,10 +13,7 @@ from collections.abc import Callable
 
 from .body_tables import floating_box, light_bodies, taylor_couette
 from .full_tables import (
-    ahead_of_time,
     cavity_of_pysph,
-    device_differences,
-    devices,
     free_flows,
     right_hand_sides,
     schemes,
@@ -24,6 +21,7 @@ from .full_tables import (
     still_water,
     versions,
 )
+from .gpu_tables import ahead_of_time, device_differences, devices, scale
 from .reduced_tables import (
     cheapest_settings,
     label_galerkin,
@@ -75,6 +73,7 @@ TABLES: dict[str, Callable[[], str]] = {
         particle_step,
         versions,
         ahead_of_time,
+        scale,
         devices,
         device_differences,
         cheapest_settings,
