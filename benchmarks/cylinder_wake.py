@@ -16,20 +16,18 @@ from __future__ import annotations
 from itertools import product
 from typing import Any
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from jaxsph import SimulationError, run_scene
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
-from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import cylinder
 from jaxsph.scenes.cylinder import DIAMETER, SPEED
 
 from .measure import format_rows, number, progress
 from .table import Table, command
 from .wake_runs import harmonic
+from .where_flow_turns import last_turn, mean_along
 
 KEY = ("reynolds", "resolution", "width", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # of a single cylinder
@@ -128,19 +126,7 @@ def wake_length(scene, trajectory, late) -> float:
     apart = np.linspace(0.1, BEHIND, 200)
     back = scene.parameters["upstream"] + 0.5 * DIAMETER
     points = np.stack([back + apart, 0.0 * apart], axis=1)
-    there = eqx.filter_jit(MovingLeastSquaresMap.allocate(jnp.asarray(points), scene.space))
-    along = []
-    for k in np.flatnonzero(late):
-        values, overflow = there(
-            jnp.asarray(trajectory.position[k]), jnp.asarray(trajectory.velocity[k][:, :1])
-        )
-        along.append(np.full(len(apart), np.nan) if overflow else np.asarray(values)[:, 0])
-    mean = np.mean(along, axis=0)
-    turns = np.flatnonzero((mean[:-1] < 0.0) & (mean[1:] >= 0.0))
-    if not len(turns):
-        return float("nan")
-    k = turns[-1]
-    return float(apart[k] + (apart[k + 1] - apart[k]) * mean[k] / (mean[k] - mean[k + 1]))
+    return last_turn(apart, mean_along(scene, trajectory, late, points))
 
 
 def _table(rows) -> str:

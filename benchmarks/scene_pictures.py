@@ -40,6 +40,7 @@ OPTIONS = {
     "taylor-couette": "--resolution 16 --t-end 0.5",
     "open-cavity": "--resolution 40 --t-end 0.5",
     "channel-cylinder": "--resolution 33 --t-end 2",
+    "backward-facing-step": "--t-end 20",
     "cylinder": "--resolution 10 --width 6 --upstream 4 --downstream 6 --t-end 60",
 }
 

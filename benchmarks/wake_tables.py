@@ -1,4 +1,4 @@
-"""Tables of a cylinder's wake: the full model beside the literature, reduced models beside it."""
+"""Tables of flows past bodies and steps beside the literature, reduced models beside them."""
 
 from __future__ import annotations
 
@@ -59,5 +59,26 @@ def wake_models() -> str:
             results("wake_models"),
             key=lambda row: (row["closure"] != "none", row["modes"], row["reynolds"]),
         )
+    ]
+    return markdown(header, rows)
+
+
+def backward_facing_step() -> str:
+    """Where the flow over a step comes back to the wall."""
+    header = ("Re", "particles over the step", "reattachment [steps]", "Erturk (2008)", "off",
+              "flux off", "changed by", "run [s]")  # fmt: skip
+    rows = [
+        (
+            short(row["reynolds"], 3),
+            str(row["resolution"]),
+            short(row["reattachment"], 4),
+            short(row["reattachment"] / (1.0 + row["reattachment_error_percent"] / 100.0), 4),
+            f"{short(row['reattachment_error_percent'])} %",
+            f"{short(row['flux_error_percent'])} %",
+            f"{short(row['change_percent'])} %",
+            f"{row['seconds']:.0f}",
+        )
+        for row in results("backward_facing_step")
+        if row["fault"] is None
     ]
     return markdown(header, rows)

@@ -2,6 +2,7 @@
 
 from . import plane_flow_solution as plane_flow_solution
 from . import taylor_green_solution as taylor_green_solution
+from .backward_facing_step import backward_facing_step as backward_facing_step
 from .balanced import balanced as balanced
 from .channel_cylinder import channel_cylinder as channel_cylinder
 from .composed import composed as composed
@@ -43,6 +44,7 @@ SCENES = {
     "poiseuille-open": poiseuille_open,
     "channel-cylinder": channel_cylinder,
     "cylinder": cylinder,
+    "backward-facing-step": backward_facing_step,
     "hydrostatic-tank": hydrostatic_tank,
     "dam-break": dam_break,
     "elliptic-drop": elliptic_drop,

@@ -36,6 +36,7 @@ from jaxsph.scenes.rotating_square_patch import patch_pressure
 from jaxsph.scenes.standing_wave import FREQUENCY
 
 SMALL = {
+    "backward-facing-step": 8,
     "channel-cylinder": 41,
     "cylinder": 10,
     "couette": 25,
