@@ -63,13 +63,14 @@ def particle_cavity() -> str:
     return _particles("lid_driven_cavity", 24, timed=True)
 
 
-def _predicted(scene: str) -> str:
-    """Models on 50 x 50 moving particles at unseen Reynolds numbers, and what they are beside."""
-    header = ("start", "Re", "M", "projection", "velocity", "pressure", "of the projection",
+def _predicted(scene: str, *sides: int) -> str:
+    """Models on moving particles at unseen Reynolds numbers, and what they are beside."""
+    header = ("particles", "start", "Re", "M", "projection", "velocity", "pressure", "of the projection",
               "low-passed", "full model's sound", "level (peak)", "named")  # fmt: skip
     names = ("velocity", "pressure", "floor_pressure", "slow_pressure", "sound")
     rows = [
         (
+            f"{side} x {side}",
             row["arrangement"],
             f"{row['reynolds']:g}",
             str(row["modes"]),
@@ -79,8 +80,9 @@ def _predicted(scene: str) -> str:
             short(row["level_peak_percent"]),
             row["fault"] or row["doubt"] or row["judged"] or "no",
         )
+        for side in sides
         for row in sorted(
-            results(f"particle_modes_{scene}_50"),
+            results(f"particle_modes_{scene}_{side}"),
             key=lambda r: (r["arrangement"], r["projection"] != "galerkin", r["reynolds"],
                            r["modes"]),
         )
@@ -90,12 +92,12 @@ def _predicted(scene: str) -> str:
 
 def predicted_vortex() -> str:
     """Of the vortex."""
-    return _predicted("taylor_green")
+    return _predicted("taylor_green", 50, 64)
 
 
 def predicted_cavity() -> str:
     """Of the cavity."""
-    return _predicted("lid_driven_cavity")
+    return _predicted("lid_driven_cavity", 50)
 
 
 def particle_step() -> str:

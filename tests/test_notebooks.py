@@ -25,9 +25,9 @@ CHECKS = {
     "14_a_flow_in_three_dimensions": ("error", 0.02, "of the energy; measured 0.013"),
     "15_results_in_paraview": ("error", 0.03, "of ParaView's filter; measured 0.016"),
 }
-# tests/benchmarks/test_inverse.py, tests/rom/points/training, tests/scenes/test_free_flows.py and
-# tests/io/test_vtkhdf.py have these problems, at small size
-SLOW = (5, 8, 9, 10, 11, 12, 13, 14, 15)
+# tests/benchmarks/test_inverse.py, tests/docs/test_extend.py, tests/rom/points/training,
+# tests/scenes/test_free_flows.py and tests/io/test_vtkhdf.py have these problems, at small size
+SLOW = (5, 6, 8, 9, 10, 11, 12, 13, 14, 15)
 
 
 @pytest.mark.parametrize(

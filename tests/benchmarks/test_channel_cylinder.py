@@ -31,6 +31,7 @@ def test_pressure_and_flux_of_a_known_flow():
     assert held == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_rows_are_told_and_kept(tmp_path, capsys):
     path = tmp_path / "rows.json"
     assert benchmark.main(["--resolutions", "33", "--t-end", "0.05", "--json", str(path)]) == 0

@@ -48,6 +48,7 @@ def test_errors_and_what_was_expected_of_them():
     assert found["break_even"] == pytest.approx(10.0)
 
 
+@pytest.mark.slow
 def test_a_family_is_judged_and_taken_up_again(tmp_path, capsys):
     path = tmp_path / "families.json"
     same = ["--cases", "vortex", "--resolution", "12", "--end-time", "0.5", "--unseen"]

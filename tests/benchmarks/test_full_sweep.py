@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 from benchmarks.full_sweep import main
 
 
+@pytest.mark.slow
 def test_members_are_single_runs(tmp_path):
     path = tmp_path / "found.json"
     small = ["--members", "2", "--side", "12", "--end-time", "0.04", "--devices", "1"]

@@ -21,6 +21,7 @@ def usual_promotion():
         yield
 
 
+@pytest.mark.slow
 def test_viscosity_from_noisy_probes():
     found = viscosity.solve(side=16, end_time=0.2, steps=5)
     assert found["error_percent"] < 0.2 * found["errors_percent"][0]  # a fifth of the guess's

@@ -100,6 +100,7 @@ def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, word):
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_pressure_that_is_uniform_at_the_start_has_a_measure_and_a_verdict(tmp_path, capsys):
     arguments = ["run", "shear-layer", "--resolution", "16", "--train", "100", "200", "--predict",
                  "150", "--modes", "3", "--t-end", "0.1", "--hyper", "tensor",

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -45,6 +46,6 @@ def test_what_cannot_be_carried_is_refused():
     with pytest.raises(ValueError, match="particles have clumped"):
         continued(fine, heap, coarse.space)
     lower = coarse.state.position[:, 1] < 0.3
-    gap = ParticleState(*(a[lower] for a in vars(coarse.state).values()))
+    gap = jax.tree.map(lambda a: a[lower], coarse.state)
     with pytest.raises(ValueError, match="leaves a place without particles"):
         continued(fine, gap, coarse.space)

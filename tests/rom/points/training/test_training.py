@@ -351,8 +351,10 @@ def of_reynolds(reynolds):
     "family, name, values, unseen, field, bound",
     [
         (of_mach, "mach", (0.05, 0.1), 0.07, "pressure", 0.2),  # sound
-        (of_lid, "speed", (0.25, 1.0), 0.5, "velocity", 0.05),
-        (of_reynolds, "reynolds", (20.0, 80.0), 40.0, "velocity", 0.05),
+        pytest.param(of_lid, "speed", (0.25, 1.0), 0.5, "velocity", 0.05, marks=pytest.mark.slow),
+        pytest.param(
+            of_reynolds, "reynolds", (20.0, 80.0), 40.0, "velocity", 0.05, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_speeds_of_sound_lids_and_forces_are_parameters(family, name, values, unseen, field, bound):
