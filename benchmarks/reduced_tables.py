@@ -65,8 +65,9 @@ def particle_cavity() -> str:
 
 def _predicted(scene: str, *sides: int) -> str:
     """Models on moving particles at unseen Reynolds numbers, and what they are beside."""
-    header = ("particles", "start", "Re", "M", "projection", "velocity", "pressure", "of the projection",
-              "low-passed", "full model's sound", "level (peak)", "named")  # fmt: skip
+    header = ("particles", "start", "Re", "M", "projection", "velocity", "pressure",
+              "of the projection", "low-passed", "full model's sound", "level (peak)",
+              "named")  # fmt: skip
     names = ("velocity", "pressure", "floor_pressure", "slow_pressure", "sound")
     rows = [
         (
