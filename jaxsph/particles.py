@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .body_state import BodyState
+from .content.parts import WHERE_SET
 
 
 class ParticleState(eqx.Module):
@@ -22,7 +23,7 @@ class ParticleState(eqx.Module):
     position: Float[Array, "particles dim"]
     velocity: Float[Array, "particles dim"]
     density: Float[Array, " particles"]
-    bodies: BodyState | None = None
+    bodies: BodyState | None = eqx.field(default=None, metadata=WHERE_SET)
 
 
 def in_dtype(tree: Any, dtype) -> Any:

@@ -16,6 +16,7 @@ import pytest
 import jaxsph
 from jaxsph import BoxRegion, MovingBody, TaitEquationOfState
 from jaxsph.arrangements import Lattice
+from jaxsph.body_state import BodyState
 from jaxsph.content import content, differences, digest
 from jaxsph.effects import BodyForce, Gravity
 from jaxsph.kernels import WendlandC4
@@ -145,3 +146,15 @@ def test_odd_parts():
     assert content(jax.random.key(3)) == content(jax.random.key(3)) != content(jax.random.key(4))
     with pytest.raises(ValueError, match=r"force\[1\]: object cannot be recorded"):
         content({"force": [1.0, object()]})
+
+
+def test_a_part_that_came_later_counts_where_it_is_set():
+    """So records of runs that were made before there were free bodies hold."""
+    scene = vortex()
+    assert scene.state.bodies is None
+    assert not [name for name in content(scene) if "bodies" in name]
+    one = jnp.zeros((1, 2))
+    afloat = dataclasses.replace(scene.state, bodies=BodyState(one, one[:, 0], one, one[:, 0]))
+    kept, wanted = content(scene.state), content(afloat)
+    assert "bodies is missing there" in differences(kept, wanted)
+    assert digest(afloat) != digest(scene.state)

@@ -15,6 +15,8 @@ from .code import PLAIN, function_parts, import_path, members, short_hash
 
 Parts = Mapping[str, Any]
 
+# metadata of a field that a class has got later: unset it is no part, so that older records hold
+WHERE_SET = {"content": "where set"}
 _SHOWN = 8  # values of an array that are written out
 _OFFSET = 0.377  # of the rounding, so that binary fractions are not on its borders
 
@@ -26,7 +28,8 @@ def described(thing: Any) -> tuple[str, Parts]:
         return "wrapped", {"function": thing.__wrapped__}
     kind = type(thing)
     if dataclasses.is_dataclass(kind):
-        names = [field.name for field in dataclasses.fields(kind) if field.compare]
+        fields = [field for field in dataclasses.fields(kind) if field.compare]
+        names = [field.name for field in fields if _counts(field, thing)]
     elif hasattr(thing, "__dict__"):
         names = [
             name
@@ -38,6 +41,11 @@ def described(thing: Any) -> tuple[str, Parts]:
     else:
         return f"{import_path(kind)} {thing!r}", {}
     return import_path(kind), members(kind) | {name: getattr(thing, name) for name in names}
+
+
+def _counts(field: dataclasses.Field, thing: Any) -> bool:
+    late = WHERE_SET.items() <= dict(field.metadata).items()
+    return not late or getattr(thing, field.name) is not None
 
 
 @described.register(bool)

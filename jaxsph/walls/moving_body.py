@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ..body_state import BodyState
+from ..content.parts import WHERE_SET
 from ..domain import Box
 from .free_body import FreeBodies
 from .region import Region
@@ -76,7 +77,7 @@ class Bodies(eqx.Module):
     velocity: Float[Array, "bodies dim"]
     acceleration: Float[Array, "bodies dim"]
     box: Box = eqx.field(static=True)
-    free: FreeBodies | None = None
+    free: FreeBodies | None = eqx.field(default=None, metadata=WHERE_SET)
 
     @classmethod
     def at_start(
