@@ -14,19 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from jaxsph import SimulationError, run_scene
 from jaxsph.cli import positive_float, positive_int
-from jaxsph.environment import environment
 from jaxsph.scenes import backward_facing_step
 from jaxsph.scenes.backward_facing_step import HEIGHT, MEAN, REATTACHMENT, STEP
 
-from .measure import format_rows, number, progress
+from .measure import format_rows, number
+from .open_flows import last_turn, mean_along, ran
 from .table import Table, command
-from .where_flow_turns import last_turn, mean_along
 
 KEY = ("reynolds", "resolution", "downstream", "end_time")
 DOWNSTREAM = {100.0: 10.0, 200.0: 14.0}  # m
 END_TIME = {100.0: 40.0, 200.0: 80.0}  # s
+SHORTEST = 4.0  # s: snapshots in the last quarter and in the one before
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -43,6 +42,8 @@ def _arguments(add) -> None:
 
 
 def _run(options) -> bool:
+    if options.t_end is not None and options.t_end < SHORTEST:
+        raise ValueError(f"--t-end: at least {SHORTEST:g} s, for means over its last two quarters.")
     kept = Table(options.json, KEY)
     cases = (
         dict(zip(KEY, (re, n, DOWNSTREAM[re], options.t_end or END_TIME[re]), strict=True))
@@ -59,22 +60,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     reynolds, resolution = case["reynolds"], case["resolution"]
     others = {name: case[name] for name in KEY[2:]}
     scene = backward_facing_step(resolution, reynolds, **others)
-    fault = None
-    with progress(f"Re {reynolds:g}, {resolution} over the step", scene.steps) as report:
-        try:
-            trajectory = run_scene(scene, progress=report)
-        except SimulationError as error:
-            fault, trajectory = str(error), error.trajectory
-    row = {
-        "particles": trajectory.particles,
-        "steps": scene.steps,
-        "seconds": trajectory.timing.run_seconds,
-        "compile_seconds": trajectory.timing.compile_seconds,
-        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
-        "fault": fault,
-        "environment": environment(),
-    }
-    return row if fault else row | judged(scene, trajectory, REATTACHMENT[reynolds])
+    trajectory, row = ran(scene, f"Re {reynolds:g}, {resolution} over the step")
+    return row if row["fault"] else row | judged(scene, trajectory, REATTACHMENT[reynolds])
 
 
 def judged(scene, trajectory, expected: float) -> dict[str, float]:

@@ -18,16 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from jaxsph import SimulationError, run_scene
 from jaxsph.cli import positive_float, positive_int
-from jaxsph.environment import environment
 from jaxsph.scenes import cylinder
 from jaxsph.scenes.cylinder import DIAMETER, SPEED
 
-from .measure import format_rows, number, progress
+from .measure import format_rows, number
+from .open_flows import last_turn, mean_along, ran
 from .table import Table, command
 from .wake_runs import harmonic
-from .where_flow_turns import last_turn, mean_along
 
 KEY = ("reynolds", "resolution", "width", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # of a single cylinder
@@ -80,22 +78,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     reynolds, resolution = case["reynolds"], case["resolution"]
     others = {name: case[name] for name in KEY[2:]}
     scene = cylinder(resolution, reynolds, **others)
-    fault = None
-    with progress(f"Re {reynolds:g}, {resolution} a diameter", scene.steps) as report:
-        try:
-            trajectory = run_scene(scene, progress=report)
-        except SimulationError as error:
-            fault, trajectory = str(error), error.trajectory
-    row = {
-        "particles": trajectory.particles,
-        "steps": scene.steps,
-        "seconds": trajectory.timing.run_seconds,
-        "compile_seconds": trajectory.timing.compile_seconds,
-        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
-        "fault": fault,
-        "environment": environment(),
-    }
-    if fault:
+    trajectory, row = ran(scene, f"Re {reynolds:g}, {resolution} a diameter")
+    if row["fault"]:
         return row
     coefficients = 2.0 * trajectory.mean_forces["cylinder"] / (SPEED**2 * DIAMETER)
     measured = shedding if reynolds > SHEDS else steady

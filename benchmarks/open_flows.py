@@ -1,15 +1,39 @@
-"""Where a mean flow turns from back to forth along a line, as at the end of a wake."""
+"""What benchmarks of open flows share: a run and its row, where a mean flow turns along a line."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxsph import Trajectory
+from jaxsph import SimulationError, Trajectory, run_scene
+from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import Scene
+
+from .measure import progress
+
+
+def ran(scene: Scene, label: str) -> tuple[Trajectory, dict[str, Any]]:
+    """A run, shown as it goes, as far as it came; its size, times, density and fault."""
+    fault = None
+    with progress(label, scene.steps) as report:
+        try:
+            trajectory = run_scene(scene, progress=report)
+        except SimulationError as error:
+            fault, trajectory = str(error), error.trajectory
+    return trajectory, {
+        "particles": trajectory.particles,
+        "steps": scene.steps,
+        "seconds": trajectory.timing.run_seconds,
+        "compile_seconds": trajectory.timing.compile_seconds,
+        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
+        "fault": fault,
+        "environment": environment(),
+    }
 
 
 def mean_along(
@@ -34,7 +58,7 @@ def last_turn(place: Float[np.ndarray, " points"], mean: Float[np.ndarray, " poi
 
     Examples:
         >>> import numpy as np
-        >>> from benchmarks.where_flow_turns import last_turn
+        >>> from benchmarks.open_flows import last_turn
         >>> last_turn(np.array([0.0, 1.0, 2.0]), np.array([1.0, -1.0, 1.0]))
         1.5
     """
