@@ -33,7 +33,9 @@ def nearest(position: Float[np.ndarray, "particles dim"], box: Box) -> float:
         for length, periodic in zip(box.lengths, box.periodic, strict=True)
     ]
     inside = np.asarray(position) - np.asarray(box.lower)
-    inside = np.where(sides, np.mod(inside, np.where(sides, sides, 1.0)), inside)
+    whole = np.where(sides, sides, 1.0)
+    wrapped = np.mod(inside, whole)  # a whole side for round-off below zero: no tree takes that
+    inside = np.where(sides, np.where(wrapped < whole, wrapped, 0.0), inside)
     if len(inside) < 2:
         return np.inf
     return float(cKDTree(inside, boxsize=sides).query(inside, 2)[0][:, 1].min())

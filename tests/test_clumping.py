@@ -38,6 +38,9 @@ def test_the_nearest_pair_may_be_across_the_box(scene):
     walled = dataclasses.replace(box, periodic=(False, True))
     assert nearest(position, walled) == pytest.approx(0.48)
     assert nearest(position[:1], box) == np.inf
+    below = position.copy()
+    below[0, 0] = -1e-18  # round-off below the face: a whole length after it is wrapped
+    assert nearest(below, box) == pytest.approx(0.02)
 
 
 def test_a_run_names_a_pair_that_sticks_together_and_goes_on(scene):

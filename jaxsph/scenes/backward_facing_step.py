@@ -18,7 +18,7 @@ from .scene import Scene
 STEP, HEIGHT, MEAN = 1.0, 1.0, 1.0  # m, m, m/s
 FRINGE = 2.0  # m
 # mean reattachment lengths over the step's height, Erturk (2008), expansion ratio 2
-REATTACHMENT = {100.0: 2.922, 200.0: 4.982, 300.0: 6.751, 400.0: 8.237}
+REATTACHMENT = {100.0: 2.922, 200.0: 4.982}
 SCALES = {
     "small": Scale(resolution=10, h_over_dx=1.5, time_step=1e-2, steps_per_snapshot=50),
     "half": Scale(resolution=20, h_over_dx=1.5, time_step=5e-3, steps_per_snapshot=100),
@@ -55,8 +55,8 @@ def backward_facing_step(
     Args:
         resolution: particles over the step's height; overrides the scale's, time step scaled along.
         reynolds: Reynolds number of mean speed and twice the channel's height.
-        upstream: from the inflow to the step [m].
-        downstream: length of the wide channel [m].
+        upstream: from the inflow to the step [m], rounded to whole spacings.
+        downstream: length of the wide channel [m], its end rounded likewise.
         scale: `small` (10 over the step), `half` (20) or `paper` (40).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
