@@ -5,8 +5,9 @@
 One row for each run. Heights are those of a wave gauge (`jaxsph.metrics.surface_height`); errors
 are the largest at any time, in percent of the wave's largest height over rest. Floor: of the full
 run's own projection on the modes. Sound: what a low-pass takes from the full run's gauge.
-`galerkin` rows are runs of the full functional projected on the same modes, at the full model's
-cost. Full runs are kept in a folder; times are process times of both models, in turns.
+`sampled` rows are runs of the full functional at a few particles, projected on the first modes;
+`galerkin` rows of that at all particles, projected on all modes, at the full model's cost. Full
+runs are kept in a folder; times are process times of both models, in turns.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ from jaxsph.scenes.sloshing import natural_frequency
 from jaxsph.scenes.standing_wave import FREQUENCY
 from jaxsph_rom import low_pass
 from jaxsph_rom.labels import LabelModel, label_snapshots, parted_share, train
+from jaxsph_rom.points import QDEIM
 from jaxsph_rom.study import full_run
 
 from .measure import alternate, format_rows, number, progress, summary, tell
 from .table import Table, command
 
 KEY = ("scene", "resolution", "modes", "model", "parameters")
+MODELS = ("labels", "sampled", "galerkin")
 _REPEATS = 5
 _GALERKIN = 12  # modes of motion and of density, all of which are projected
 
@@ -55,6 +58,7 @@ class Case:
         modes: numbers of coordinates.
         resolutions: along the scene.
         galerkin: whether the projected functional is run, too.
+        samples: particles of the sampled one.
     """
 
     make: Callable[..., Scene]
@@ -65,6 +69,17 @@ class Case:
     modes: tuple[int, ...] = (3, 4)
     resolutions: tuple[int, ...] = (32, 48)
     galerkin: bool = True
+    samples: int = 16
+
+    def of(self, model: str, modes: int) -> list[dict[str, float]]:
+        """Parameters that a kind of model is run at."""
+        match model:
+            case "labels":
+                return [*self.trained_on, *self.unseen]
+            case "sampled":
+                return self.unseen
+            case _:
+                return self.unseen[:1] if self.galerkin and modes == max(self.modes) else []
 
 
 def _wave(resolution: int, amplitude: float, reynolds: float) -> Scene:
@@ -125,6 +140,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _arguments(add) -> None:
     add("--scenes", choices=tuple(CASES), nargs="+", default=list(CASES), help="default: all")
+    add("--models", choices=MODELS, nargs="+", default=list(MODELS), help="default: all")
     add("--resolutions", type=positive_int, nargs="+", metavar="N", help="default: two per scene")
     add("--out", type=Path, default=Path("out/label-models"), metavar="DIR",
         help="where full runs are kept (default: %(default)s)")  # fmt: skip
@@ -137,8 +153,9 @@ def _run(options) -> None:
         for resolution in options.resolutions or case.resolutions:
             judge = Judge(name, case, resolution, options.out)
             for modes in case.modes:
-                for row in judge.rows(modes, kept):
-                    kept.add(row)
+                for model in options.models:
+                    for row in judge.rows(model, modes, kept):
+                        kept.add(row)
     print(table(kept.rows))
 
 
@@ -155,24 +172,20 @@ class Judge:
         place = "-".join([self.name, str(self.resolution), *(f"{value:g}" for value in point)])
         return full_run(self.folder, self.scene(*point), progress, place)
 
-    def rows(self, modes: int, kept: Table):
-        """A row for each training point and each unseen one."""
+    def rows(self, model: str, modes: int, kept: Table):
+        """A row for each training point and each unseen one that the kind of model is run at."""
         case = self.case
-        points = [*case.trained_on, *case.unseen]
-        kinds = ["labels", *(["galerkin"] if case.galerkin and modes == max(case.modes) else [])]
-        keys = [
-            {"scene": self.name, "resolution": self.resolution, "modes": modes, "model": kind,
-             "parameters": point}
-            for kind in kinds for point in (points if kind == "labels" else case.unseen[:1])
-        ]  # fmt: skip
-        wanted = list(kept.left(keys))
+        here = {"scene": self.name, "resolution": self.resolution, "modes": modes, "model": model}
+        wanted = list(kept.left(here | {"parameters": point} for point in case.of(model, modes)))
         if not wanted:
             return
         runs = [self.full(*point.values()) for point in case.trained_on]
-        tell(f"{self.name}: learning {modes} coordinates")
-        trained = train(partial(case.make, self.resolution), case.trained_on, modes, runs=runs)
+        tell(f"{self.name}: {model}, {modes} coordinates")
+        chosen = {"sampling": QDEIM(case.samples)} if model == "sampled" else {}
+        make = partial(case.make, self.resolution)
+        trained = train(make, case.trained_on, modes, runs=runs, **chosen)
+        run = self._galerkin if model == "galerkin" else self._labels
         for key in wanted:
-            run = self._labels if key["model"] == "labels" else self._galerkin
             yield {**key, **run(trained, key["parameters"])}
 
     def _labels(self, trained: LabelModel, point) -> dict[str, Any]:
@@ -198,6 +211,7 @@ class Judge:
         away = np.linalg.norm(found.velocity - full.velocity[: len(found.time)], axis=2)
         return row | {
             "trained_on": len(self.case.trained_on),
+            "members": trained.training.get("members"),
             "seen": point in self.case.trained_on,
             "outside": bool(prediction.outside[0]),
             "particles": full.particles,
@@ -327,7 +341,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         (
             row["scene"],
             str(row.get("particles", "")),
-            str(row["modes"] if row["model"] == "labels" else 2 * _GALERKIN),
+            str(row["modes"] if row["model"] != "galerkin" else 2 * _GALERKIN),
             row["model"] + (", seen" if row.get("seen") else ""),
             ", ".join(f"{value:g}" for value in row["parameters"].values()),
             number(row["height_error_percent"]),

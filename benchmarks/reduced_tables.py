@@ -176,6 +176,29 @@ def label_models() -> str:
     return markdown(header, rows)
 
 
+def label_samples() -> str:
+    """The full functional at a few particles."""
+    header = ("particles", "that are followed", "modes", "at", "height off by %", "mean %",
+              "full [s]", "reduced [s]", "times faster")  # fmt: skip
+    rows = [
+        (
+            str(row["particles"]),
+            str(row["members"]),
+            str(row["modes"]),
+            ", ".join(f"{name} {value:g}" for name, value in row["parameters"].items())
+            + (" (outside)" if row["outside"] else ""),
+            short(row["height_error_percent"]),
+            short(row["height_error_mean_percent"]),
+            short(row["full_process_seconds"]),
+            short(row["reduced_process_seconds"]),
+            short(row["times_faster"]),
+        )
+        for row in results("label_models")
+        if row["model"] == "sampled"
+    ]
+    return markdown(header, rows)
+
+
 def label_galerkin() -> str:
     """The projected functional beside the learnt model of the same flow."""
     rows = results("label_models")

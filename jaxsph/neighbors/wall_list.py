@@ -199,7 +199,7 @@ class WalledSearch(eqx.Module):
             whole,
             near_capacity=1,
             near_run_capacity=int(max(margin, RUN_MARGIN) * near_run) + 2,
-            ghost_run_capacity=math.ceil(more * ghost_run) + (2 if moving else 0),
+            ghost_run_capacity=max(1, math.ceil(more * ghost_run) + (2 if moving else 0)),
         )
         near = np.asarray(trial._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
         free = near & (distance > 0.72 * spacing)  # between ghosts is no room

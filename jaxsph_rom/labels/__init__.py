@@ -8,6 +8,8 @@ from .label_basis import LabelBasis as LabelBasis
 from .label_model import LabelModel as LabelModel
 from .label_model import load as load
 from .label_prediction import LabelPrediction as LabelPrediction
+from .label_system import LabelSystem as LabelSystem
 from .mixing import mixed_from as mixed_from
 from .mixing import parted_share as parted_share
+from .sampled_system import SampledSystem as SampledSystem
 from .training import train as train

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
 from typing import final
 
-import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
-from ..points.dynamics.base import Dynamics
 from .inputs import Inputs
-
-_DEGREE = 3
+from .label_system import LabelSystem
+from .products import products
 
 
 @final
-class CubicSystem(Dynamics):
+class CubicSystem(LabelSystem):
     """da_i/dt = sum_k W_ik m_k(a, p), and what else is known of the flow by the same products:
 
         m = (1, a_j, a_j a_k, a_j a_k a_l, p_q, p_q a_j),    b = D m,
@@ -46,26 +42,3 @@ class CubicSystem(Dynamics):
     ) -> Float[Array, " modes"]:
         """da/dt."""
         return self.weights @ products(coordinates, self.inputs(time, values))
-
-    def recovered(self, time, coordinates, values) -> Float[Array, " recovered"]:
-        """b."""
-        return self.recovery @ products(coordinates, self.inputs(time, values))
-
-
-def products(
-    coordinates: Float[Array, " modes"], inputs: Float[Array, " inputs"]
-) -> Float[Array, " products"]:
-    """m(a, p)."""
-    size = len(coordinates)
-    factors = np.full((len(_powers(size)), _DEGREE), size)  # the last one is 1
-    for row, chosen in enumerate(_powers(size)):
-        factors[row, : len(chosen)] = chosen
-    ahead = jnp.append(coordinates, jnp.ones((), coordinates.dtype))
-    own = jnp.prod(ahead[factors], axis=1)
-    mixed = inputs[:, None] * ahead[None, :]
-    return jnp.concatenate([own, mixed.reshape(-1)])
-
-
-def _powers(size: int) -> list[tuple[int, ...]]:
-    numbers = range(size)
-    return [p for d in range(_DEGREE + 1) for p in combinations_with_replacement(numbers, d)]

@@ -6,7 +6,7 @@ from typing import Self
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 
 class LabelBasis(eqx.Module):
@@ -71,3 +71,10 @@ class LabelBasis(eqx.Module):
     def numbers(self, coordinates: Float[np.ndarray, "*times modes"]) -> Array:
         """z."""
         return coordinates @ self.modes.T / self.scale + self.centre
+
+    def at(self, labels: Int[np.ndarray, " labels"], fields: int, width: int) -> Self:
+        """The same on some labels, where each of the fields has `width` numbers a label."""
+        rows = np.arange(len(self.scale)).reshape(fields, -1, width)[:, labels].reshape(-1)
+        return type(self)(
+            self.modes[rows], self.centre[rows], self.scale[rows], self.singular_values
+        )

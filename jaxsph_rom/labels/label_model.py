@@ -24,9 +24,9 @@ from ..points.parameters.family import table
 from ..points.parameters.laws import Between, Law
 from ..points.prediction.sweep import batch_of
 from ..points.prediction.times import EvenTimes, GivenTimes
-from .cubic_system import CubicSystem
 from .label_basis import LabelBasis
 from .label_prediction import LabelPrediction
+from .label_system import LabelSystem
 
 KIND = ("jaxsph reduced labels", 1)
 _EDGE = 1e-6  # of a parameter's range: so much beyond is not outside
@@ -38,7 +38,7 @@ class LabelModel(eqx.Module):
     """A reduced model of a family of scenes on the particles' labels, as `train` makes it.
 
     Each label's displacement, velocity and density are modes over labels times coordinates; the
-    first M of motion's coordinates a are moved by a `CubicSystem`, and all others follow from
+    first M of motion's coordinates a are moved by a `LabelSystem`, and all others follow from
     these. It is run by the full model's time loop, at a cost that does not depend on the number of
     particles.
 
@@ -53,14 +53,14 @@ class LabelModel(eqx.Module):
         operators, starts: theta and coordinates at the start of the parameters, by a law that was
             found, or between the training points.
         space: of the scenes (static).
-        schedule: of the training runs (static).
+        schedule: of its own steps and the training runs' snapshots (static).
         scene: their name (static).
         training: how it was trained, what that cost and what errors are left (static).
     """
 
     motion: LabelBasis
     density: LabelBasis
-    system: CubicSystem
+    system: LabelSystem
     bound: EnergyBound
     labels: Float[np.ndarray, "particles dim"]
     names: tuple[str, ...] = eqx.field(static=True)

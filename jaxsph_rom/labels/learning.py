@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,13 +15,15 @@ from jaxtyping import Array, Float
 from jaxsph.compiled import full_precision
 from jaxsph.integrate import rk4_step
 
-from .cubic_system import CubicSystem, products
+from .cubic_system import CubicSystem
 from .inputs import Inputs
+from .label_system import LabelSystem
+from .products import products
 
 _EDGE = 3  # snapshots at both ends that a filter and a difference spoil
 _RIDGES = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the products' mean squares
 _RECOVERY_RIDGE = 1e-6
-_STEPS = 2  # of RK4 from snapshot to snapshot
+STEPS = 2  # of RK4 from snapshot to snapshot
 _ITERATIONS = 30
 _STAY = 1e-6  # how much weights cost that leave those of the rates
 _DONE = 1e-4  # relative change of the error that ends the iteration
@@ -59,6 +61,15 @@ class Learnt(NamedTuple):
     before: float
     after: float
 
+    def told(self) -> dict[str, Any]:
+        """For the record."""
+        return {
+            "products": self.system.weights.shape[1],
+            "rate_error": self.rate_error,
+            "error_by_rates": self.before,
+            "error": self.after,
+        }
+
 
 def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
     """W and D of a `CubicSystem`.
@@ -84,31 +95,60 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
         ValueError: for fewer than eleven snapshots, or if no ridge gives a system that stays
             bounded on the runs.
     """
-    count = len(runs[0].coordinates)
-    if count < 2 * _EDGE + 5:
-        raise ValueError(f"runs: {count} snapshots; rates need {2 * _EDGE + 5}. Record more often.")
-    times = interval * np.arange(count)
-    inner = slice(_EDGE, count - _EDGE)
-    features = (_features(inputs, r.coordinates, times, r.values) for r in runs)
-    known = np.concatenate([np.asarray(f, float)[inner] for f in features])
+    known, size = _known(runs, inputs, interval)
     rates = np.concatenate([_rates(np.asarray(r.coordinates, float), interval) for r in runs])
-    others = np.concatenate([np.asarray(r.others[inner], float) for r in runs])
-    size = np.sqrt((known**2).mean(axis=0))
-    size = np.where(size > 0.0, size, 1.0)
-    recovery = _fitted(known / size, others, _RECOVERY_RIDGE) / size
-    roll_outs = _RollOuts.of(runs, inputs, size, interval, recovery)
+    recovery = recover(runs, inputs, interval)
+    roll_outs = _RollOuts.of(runs, interval)
     tried = [_fitted(known / size, rates, ridge) for ridge in _RIDGES]
-    errors = [float(jnp.linalg.norm(roll_outs.residual(weights))) for weights in tried]
+    dtype = runs[0].coordinates.dtype
+    start, found, sizes = (jnp.asarray(a, dtype) for a in (tried[0], recovery, size))
+    unlearnt = CubicSystem(weights=start, recovery=found, inputs=inputs)
+    errors = [roll_outs.error(_weighted(unlearnt, sizes, jnp.asarray(w, dtype))) for w in tried]
     before, first = min(zip(errors, tried, strict=True), key=lambda pair: _finite(pair[0]))
     if not np.isfinite(before):
         raise ValueError(
             f"modes: no system of {len(first)} of them stays bounded on the training runs; take "
             "fewer modes, or more runs."
         )
-    weights, after = roll_outs.refined(jnp.asarray(first, runs[0].coordinates.dtype))
+    weights, after = roll_outs.refined(unlearnt, sizes, jnp.asarray(first, dtype))
     left = known @ (first / size).T - rates
     error = np.sqrt((left**2).mean(axis=0) / (rates**2).mean(axis=0))
-    return Learnt(roll_outs.system(weights), [float(e) for e in error], before, after)
+    system = _weighted(unlearnt, sizes, weights)
+    return Learnt(system, [float(e) for e in error], before, after)
+
+
+def error_on(system: LabelSystem, runs: Sequence[LabelRun], interval: float) -> float:
+    """Relative root mean square error of the roll-outs of runs."""
+    return _RollOuts.of(runs, interval).error(system)
+
+
+def _weighted(system: CubicSystem, sizes, weights) -> CubicSystem:
+    return eqx.tree_at(lambda s: s.weights, system, weights / sizes[None, :])
+
+
+def recover(
+    runs: Sequence[LabelRun], inputs: Inputs, interval: float
+) -> Float[np.ndarray, "recovered products"]:
+    """D of a `LabelSystem`, by least squares from runs with a snapshot in every interval [s].
+
+    Raises:
+        ValueError: for fewer than eleven snapshots.
+    """
+    known, size = _known(runs, inputs, interval)
+    others = np.concatenate([np.asarray(r.others[_EDGE:-_EDGE], float) for r in runs])
+    return _fitted(known / size, others, _RECOVERY_RIDGE) / size
+
+
+def _known(runs, inputs, interval):
+    """Products of all runs, without the ends, and their sizes."""
+    count = len(runs[0].coordinates)
+    if count < 2 * _EDGE + 5:
+        raise ValueError(f"runs: {count} snapshots; rates need {2 * _EDGE + 5}. Record more often.")
+    times = interval * np.arange(count)
+    features = (_features(inputs, r.coordinates, times, r.values) for r in runs)
+    known = np.concatenate([np.asarray(f, float)[_EDGE:-_EDGE] for f in features])
+    size = np.sqrt((known**2).mean(axis=0))
+    return known, np.where(size > 0.0, size, 1.0)
 
 
 def _finite(error: float) -> float:
@@ -141,29 +181,24 @@ def _fitted(features: np.ndarray, wanted: np.ndarray, ridge: float) -> np.ndarra
 class _RollOuts(eqx.Module):
     """Runs of a system from the starts of all full runs, beside these."""
 
-    inputs: Inputs
-    size: Float[Array, " products"]
-    recovery: Float[Array, "recovered products"]
     starts: Float[Array, "runs modes"]
     values: Float[Array, "runs coefficients"]
     wanted: Float[Array, "runs snapshots modes"]
     interval: Float[Array, ""]
 
     @classmethod
-    def of(cls, runs: Sequence[LabelRun], inputs, size, interval, recovery):
-        dtype = runs[0].coordinates.dtype
+    def of(cls, runs: Sequence[LabelRun], interval: float):
         stacked = (np.stack([getattr(r, n) for r in runs]) for n in ("start", "values"))
         wanted = np.stack([r.coordinates for r in runs])
-        arrays = (size, recovery, *stacked, wanted, interval)
-        return cls(inputs, *(jnp.asarray(a, dtype) for a in arrays))
+        return cls(*(jnp.asarray(a, wanted.dtype) for a in (*stacked, wanted, interval)))
 
-    def system(self, weights: Float[Array, "modes products"]) -> CubicSystem:
-        return CubicSystem(weights / self.size[None, :], self.recovery, self.inputs)
+    def error(self, system: LabelSystem) -> float:
+        return float(jnp.linalg.norm(self.residual(system)))
 
     @eqx.filter_jit
     @full_precision
-    def residual(self, weights) -> Float[Array, " numbers"]:
-        system, step = self.system(jnp.asarray(weights, self.size.dtype)), self.interval / _STEPS
+    def residual(self, system: LabelSystem) -> Float[Array, " numbers"]:
+        step = self.interval / STEPS
 
         def run(start, values):
             def one(a, k):
@@ -171,10 +206,10 @@ class _RollOuts(eqx.Module):
                 return rk4_step(lambda t, a: system.rates(t, a, values), time, a, step), None
 
             def interval(a, first):
-                a, _ = lax.scan(one, a, first + jnp.arange(_STEPS))
+                a, _ = lax.scan(one, a, first + jnp.arange(STEPS))
                 return a, a
 
-            firsts = _STEPS * jnp.arange(self.wanted.shape[1] - 1)
+            firsts = STEPS * jnp.arange(self.wanted.shape[1] - 1)
             return lax.scan(interval, start, firsts)[1]
 
         off = jax.vmap(run)(self.starts, self.values) - self.wanted[:, 1:]
@@ -183,24 +218,34 @@ class _RollOuts(eqx.Module):
 
     @eqx.filter_jit
     @full_precision
-    def _jacobian(self, weights):
-        return jax.jacfwd(lambda w: self.residual(w.reshape(weights.shape)))(weights.reshape(-1))
+    def _jacobian(self, system, sizes, weights):
+        def residual(row):
+            return self.residual(_weighted(system, sizes, row.reshape(weights.shape)))
 
-    def refined(self, first: Float[Array, "modes products"]) -> tuple[Array, float]:
-        """Weights after Gauss-Newton steps from the first, and the error then."""
+        return jax.jacfwd(residual)(weights.reshape(-1))
+
+    def refined(
+        self, system: CubicSystem, sizes: Float[Array, " products"],
+        first: Float[Array, "modes products"],
+    ) -> tuple[Array, float]:  # fmt: skip
+        """Weights, in the sizes of the products, after Gauss-Newton steps from the first, and the
+        error then."""
 
         def cost(off, weights):
             return float(off @ off + _STAY * jnp.sum((weights - first) ** 2))
 
-        weights, off = first, self.residual(first)
+        def residual(weights):
+            return self.residual(_weighted(system, sizes, weights))
+
+        weights, off = first, residual(first)
         least, (damping, better, worse) = cost(off, weights), _DAMPING
-        slope = self._jacobian(weights)
+        slope = self._jacobian(system, sizes, weights)
         for _ in range(_ITERATIONS):
             squares = slope.T @ slope + _STAY * jnp.eye(slope.shape[1], dtype=slope.dtype)
             down = slope.T @ off + _STAY * (weights - first).reshape(-1)
             change = jnp.linalg.solve(squares + damping * jnp.diag(jnp.diag(squares)), down)
             tried = weights - change.reshape(weights.shape)
-            found = self.residual(tried)
+            found = residual(tried)
             reached = cost(found, tried)
             if not reached < least:  # nor a NaN
                 damping *= worse
@@ -208,5 +253,5 @@ class _RollOuts(eqx.Module):
             gained, weights, off, least = 1.0 - reached / least, tried, found, reached
             if gained < _DONE:
                 break
-            damping, slope = damping * better, self._jacobian(weights)
+            damping, slope = damping * better, self._jacobian(system, sizes, weights)
         return weights, float(jnp.linalg.norm(off))

@@ -10,20 +10,21 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jaxsph import Trajectory, run_scene
+from jaxsph import Schedule, Trajectory, run_scene
 from jaxsph.scenes import Scene
 
 from ..basis.low_pass import low_pass
 from ..points.dynamics.energy_bound import EnergyBound
+from ..points.dynamics.sampling import Sampling
 from ..points.parameters.family import Family, refuse_unlike, table
 from ..points.parameters.laws import Between, Law
-from .cubic_system import products
 from .displacement import label_snapshots
 from .inputs import Inputs
 from .label_basis import LabelBasis
 from .label_model import LabelModel
-from .learning import LabelRun, learn
+from .learning import STEPS, LabelRun, error_on, learn
 from .mixing import MIXED, mixed_from
+from .sampling import sample
 
 _SOUND = 0.5  # of the slowest sound's frequency: what is above is filtered out
 _NYQUIST = 0.9  # of it, at most
@@ -38,6 +39,7 @@ def train(
     *,
     runs: Sequence[Trajectory] | None = None,
     recovered: int = 12,
+    sampling: Sampling | None = None,
 ) -> LabelModel:
     """Run the full model at the training points, and learn a reduced model on labels from these.
 
@@ -51,6 +53,8 @@ def train(
         modes: M, coordinates that have rates.
         runs: full runs of the scenes, if they are there already.
         recovered: modes of motion that fields are made of, M at least, and of density.
+        sampling: particles at which the full functional is evaluated as they move
+            (`SampledSystem`); without it rates are learnt (`CubicSystem`).
 
     Raises:
         ValueError: if scenes differ in their particles' places or in what no reduced model can
@@ -102,22 +106,26 @@ def train(
         others = np.concatenate([coordinates[:, modes:], density.project(dense)], axis=1)
         start = _start(scene, motion, modes)
         projected.append(LabelRun(theta, start, coordinates[:, :modes], others))
-    learnt = learn(projected, inputs, first.schedule.interval)
+    interval, place = first.schedule.interval, np.asarray(first.state.position)
+    if sampling is None:
+        learnt = learn(projected, inputs, interval)
+        system, told = learnt.system, learnt.told()
+    else:
+        models = [s.model() for s in scenes]
+        system = sample(sampling, models, projected, place, motion, density, inputs, interval)
+        told = {"members": len(system.labels), "error": error_on(system, projected, interval)}
     probed, known, starts = _probed(family, scenes, names, points, inputs, motion, modes)
     largest = np.abs(np.concatenate([p.coordinates for p in projected])).max(axis=0)
-    told = {
+    told |= {
         "trained_on": named,
         "full_seconds": [r.metadata.get("run_seconds") for r in runs],
         "offline_seconds": clock.perf_counter() - before,
-        "products": int(products(jnp.zeros(modes), jnp.zeros(inputs.count)).size),
-        "rate_error": learnt.rate_error,
-        "error_by_rates": learnt.before,
-        "error": learnt.after,
     }
+    steps = Schedule(interval / STEPS, STEPS, first.schedule.intervals)
     return LabelModel(
-        motion, density, learnt.system, _bound(largest), np.asarray(first.state.position), names,
+        motion, density, system, _bound(largest), place, names,
         points, _law(probed, known, points), _law(probed, starts, points, np.abs(starts).max()),
-        first.space, first.schedule, first.name, told,
+        first.space, steps, first.name, told,
     )  # fmt: skip
 
 

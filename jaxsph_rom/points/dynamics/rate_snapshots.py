@@ -12,6 +12,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
+from jaxsph import Fluid
 from jaxsph.compiled import full_precision
 
 from ...basis import Basis, InnerProduct, Uncentred, pod
@@ -78,8 +79,16 @@ def rate_basis(rates: EulerianRates, basis: Basis, visited: Sequence[VisitedStat
         for states in visited
     ]
     snapshots = np.concatenate([np.asarray(part) for parts in found for part in parts])
-    product = _OfRates(np.asarray(basis.weights))
-    whole = pod(np.moveaxis(snapshots, 0, -1), product, rates.functional.fluid)
+    return rate_modes(np.moveaxis(snapshots, 0, -1), basis.weights, rates.functional.fluid)
+
+
+def rate_modes(
+    snapshots: Float[np.ndarray, "points fields snapshots"],
+    weights: Float[np.ndarray, " fields"],
+    fluid: Fluid,
+) -> Basis:
+    """POD of rates about zero, in the product with these weights, without what is round-off."""
+    whole = pod(snapshots, _OfRates(np.asarray(weights)), fluid)
     sigma = whole.singular_values
     return whole.truncated(int(np.count_nonzero(sigma > _SMALLEST * sigma[0])))
 
