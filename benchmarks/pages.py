@@ -24,6 +24,7 @@ from .full_tables import (
 from .gpu_tables import ahead_of_time, device_differences, devices, scale
 from .reduced_tables import (
     cheapest_settings,
+    density_readings,
     label_galerkin,
     label_models,
     label_samples,
@@ -78,6 +79,7 @@ TABLES: dict[str, Callable[[], str]] = {
         devices,
         device_differences,
         cheapest_settings,
+        density_readings,
         label_models,
         label_samples,
         label_galerkin,

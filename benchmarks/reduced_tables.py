@@ -149,6 +149,31 @@ def cheapest_settings() -> str:
     )  # fmt: skip
 
 
+def density_readings() -> str:
+    """What the paper's cavity looks like at either reference density."""
+    header = ("cavity", "rho0", "M", "energy left, labels %", "paper's", "points %", "paper's",
+              "floor of velocity", "of pressure")  # fmt: skip
+    rows = [
+        (
+            f"{row['resolution']} x {row['resolution']}",
+            f"{row['reference_density']:g}",
+            str(row["modes"]),
+            *(
+                short(row[f"{space}_{of}_left_percent"])
+                for space in ("lagrangian", "reference")
+                for of in ("energy", "paper")
+            ),
+            *(
+                f"{short(row[f'{name}_floor_peak_percent'])} / "
+                f"{short(row[f'{name}_floor_median_percent'])}"
+                for name in ("velocity", "pressure")
+            ),
+        )
+        for row in results("density_readings")
+    ]
+    return markdown(header, rows)
+
+
 def label_models() -> str:
     """Models on labels at the parameters that they have not seen."""
     header = ("wave", "particles", "modes", "at", "height off by %", "mean %", "floor %",

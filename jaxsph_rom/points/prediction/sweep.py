@@ -15,12 +15,14 @@ from jaxtyping import Array, Float, Int
 
 from jaxsph import Schedule
 from jaxsph.compiled import full_precision
+from jaxsph.sweeps.room import Device, check_room
 
 from ..dynamics.points_model import PointsModel
 from .reduced_flow import ReducedFlow
 from .times import EvenTimes, Times
 
-BATCH = 500  # members; what a step touches then stays in cache
+_BATCH = 500  # members of a CPU; what a step touches then stays in cache
+_WIDE_BATCH = 100_000  # of a GPU, which is busy with many
 
 
 class Sweep(NamedTuple):
@@ -46,7 +48,7 @@ def sweep(
     values: Float[Array, " *members_and_coefficients"],
     schedule: Schedule,
     *,
-    batch: int = BATCH,
+    batch: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Sweep:
     """Run a flow from each start at its coefficients by `jax.vmap` of the time loop.
@@ -59,11 +61,13 @@ def sweep(
         starts: coordinates at the start.
         values: theta of each member; a viscosity [m^2/s], say.
         schedule: of all members.
-        batch: members that a device runs at a time.
+        batch: members that a device runs at a time; 500 on a CPU, whose cache holds them, and
+            100,000 on a GPU if it is not given.
         progress: is called with the number of members done since its last call.
 
     Raises:
-        ValueError: if there is no member, or there are not as many starts as coefficients.
+        ValueError: if there is no member, there are not as many starts as coefficients, or a
+            device has no memory for the batch; nothing is run then.
     """
     if schedule.intervals < 1:
         raise ValueError("schedule: at least one interval to run, got none.")
@@ -77,7 +81,7 @@ def swept(
     values: Float[Array, " *members_and_coefficients"],
     times: Times,
     *,
-    batch: int = BATCH,
+    batch: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Sweep:
     """`sweep` at given times."""
@@ -91,7 +95,10 @@ def swept(
         )
     devices = jax.local_devices()
     spread = NamedSharding(Mesh(np.asarray(devices), ("members",)), PartitionSpec("members"))
-    size = len(devices) * min(batch, -(-count // len(devices)))
+    if batch is None:
+        batch = _BATCH if devices[0].platform == "cpu" else _WIDE_BATCH
+    batch = min(batch, -(-count // len(devices)))
+    size = len(devices) * batch
     coordinates = np.empty((count, times.count, flow.system.size), dtype)
     faults = np.empty((2, count), np.int32)
     seconds, first = [], None
@@ -103,6 +110,7 @@ def swept(
             jax.device_put(values[filled], spread),
         )  # fmt: skip
         if first is None:
+            _check_room(arguments, devices[0], batch)
             before = clock.perf_counter()
             jax.block_until_ready(batch_of(*arguments))
             first = clock.perf_counter() - before
@@ -114,6 +122,11 @@ def swept(
         if progress is not None:
             progress(len(rows))
     return Sweep(coordinates, *faults, sum(seconds), max(0.0, first - seconds[0]))
+
+
+def _check_room(arguments: tuple, device: Device, batch: int) -> None:
+    if device.memory_stats():  # a CPU tells nothing
+        check_room(batch_of.lower(*arguments).compile().compiled, device, batch)
 
 
 @eqx.filter_jit

@@ -1,5 +1,8 @@
 """Many Reynolds numbers at once: member by member what single runs give."""
 
+from importlib import import_module
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ from jaxsph_rom.points import (
     sweep,
 )
 
+prediction_sweep = import_module("jaxsph_rom.points.prediction.sweep")  # not the function
 MODES = 3
 STEPS = Schedule(time_step=0.01, steps_per_snapshot=2, intervals=20)
 
@@ -89,3 +93,13 @@ def test_energy_is_that_of_the_fields():
 def test_without_members_there_is_no_sweep():
     with pytest.raises(ValueError, match="at least one"):
         sweep(make_flow(), np.zeros((0, MODES)), np.zeros(0), STEPS)
+
+
+def test_a_batch_without_memory_is_refused(monkeypatch):
+    """A device that is full, in place of one that runs."""
+    full = SimpleNamespace(memory_stats=lambda: {"bytes_limit": 2**17, "bytes_in_use": 0})
+    flow, starts = make_flow(), np.ones((400, MODES))
+    asked = prediction_sweep._check_room
+    monkeypatch.setattr(prediction_sweep, "_check_room", lambda a, _, batch: asked(a, full, batch))
+    with pytest.raises(ValueError, match=r"batch: 400 members .* batch=\d+ should fit"):
+        sweep(flow, starts, np.full(400, 0.01), STEPS)
