@@ -46,7 +46,8 @@ class FreeSurface(Effect):
     def on_fixed_points(self):
         raise ValueError(
             "effects: a free surface moves across points that stay, and FreeSurface has no form "
-            "there; choose a scene whose fluid fills its box or vessel."
+            "there; choose a scene whose fluid fills its box or vessel, or, for waves whose "
+            "particles do not mix, jaxsph_rom.labels.train."
         )
 
     def geometry_terms(self, context):
