@@ -101,6 +101,11 @@ def predicted_cavity() -> str:
     return _predicted("lid_driven_cavity", 50)
 
 
+def larger_cavity() -> str:
+    """Of the cavity of 100 x 100 particles, at the Reynolds number that it was trained at."""
+    return _predicted("lid_driven_cavity", 100)
+
+
 def particle_step() -> str:
     """What a step on moving particles costs, times of the process."""
     header = ("scene", "particles", "M", "projection", "full [ms]", "reduced [ms]", "ratio")
