@@ -34,7 +34,7 @@ from .reduced_tables import (
     scheme_models,
 )
 from .table_text import ROOT
-from .wake_tables import backward_facing_step, cylinder_wake, wake_models
+from .wake_tables import backward_facing_step, cylinder_wake, drag_slopes, wake_models
 
 PAGES = ROOT / "docs" / "measured"
 _BLOCK = re.compile(r"(<!-- table ([\w-]+) -->\n).*?(?=^<!-- end -->)", re.MULTILINE | re.DOTALL)
@@ -81,6 +81,7 @@ TABLES: dict[str, Callable[[], str]] = {
         label_galerkin,
         backward_facing_step,
         cylinder_wake,
+        drag_slopes,
         wake_models,
         floating_box,
         light_bodies,
