@@ -34,7 +34,13 @@ from .reduced_tables import (
     scheme_models,
 )
 from .table_text import ROOT
-from .wake_tables import backward_facing_step, cylinder_wake, drag_slopes, wake_models
+from .wake_tables import (
+    backward_facing_step,
+    cylinder_wake,
+    drag_slopes,
+    open_flux,
+    wake_models,
+)
 
 PAGES = ROOT / "docs" / "measured"
 _BLOCK = re.compile(r"(<!-- table ([\w-]+) -->\n).*?(?=^<!-- end -->)", re.MULTILINE | re.DOTALL)
@@ -79,6 +85,7 @@ TABLES: dict[str, Callable[[], str]] = {
         cheapest_settings,
         label_models,
         label_galerkin,
+        open_flux,
         backward_facing_step,
         cylinder_wake,
         drag_slopes,

@@ -87,6 +87,24 @@ def wake_models() -> str:
     return markdown(header, rows)
 
 
+def open_flux() -> str:
+    """What flows through the sections of an open channel, beside what flows in."""
+    header = ("particles across", "Mach", "compressed from end to end", "mass off",
+              "mass, section to section", "volume off", "run [s]")  # fmt: skip
+    names = ("compressed", "mass_off", "mass_lost_on_the_way", "volume_off")
+    rows = [
+        (
+            str(row["resolution"]),
+            f"{row['mach']:g}",
+            *(f"{short(100.0 * row[name])} %" for name in names),
+            f"{row['seconds']:.0f}",
+        )
+        for row in sorted(results("open_flux"), key=lambda row: (row["resolution"], -row["mach"]))
+        if row["fault"] is None
+    ]
+    return markdown(header, rows)
+
+
 def backward_facing_step() -> str:
     """Where the flow over a step comes back to the wall."""
     header = ("Re", "particles over the step", "reattachment [steps]", "Erturk (2008)", "off",
