@@ -81,7 +81,7 @@ def flow_through(
     state = scene.state
     began = jnp.zeros((), state.position.dtype)
     entering = inflow(state.position, began)
-    _check_inflow(entering, state.position, speed)
+    _check_inflow(entering, state.position, held, speed)
     flowing = entering if start is None else start(state.position)
     return dataclasses.replace(
         scene,
@@ -110,16 +110,17 @@ def _check_even(
         )
 
 
-def _check_inflow(velocity, position, speed: float) -> None:
-    """A ValueError if an inflow is no velocity, or too fast for the speed of sound."""
+def _check_inflow(velocity, position, fringe: Fringe, speed: float) -> None:
+    """A ValueError if an inflow is no velocity, or too fast for the sound where it is held."""
     if jnp.shape(velocity) != position.shape:
         raise ValueError(
             f"inflow: gives an array of shape {jnp.shape(velocity)} for positions of shape "
             f"{position.shape}; return a velocity for each."
         )
-    if not concrete(velocity):
+    if not concrete(velocity, position):
         return
-    fastest = float(jnp.sqrt(jnp.max(jnp.sum(velocity**2, axis=1))))
+    there = np.asarray(position)[:, 0] > fringe.start
+    fastest = float(np.linalg.norm(np.asarray(velocity)[there], axis=1).max(initial=0.0))
     if not fastest <= _FASTER * speed:
         raise ValueError(
             f"inflow: is as fast as {fastest:.4g} m/s at the start, and the speed of sound is set "
