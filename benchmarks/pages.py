@@ -37,7 +37,13 @@ from .reduced_tables import (
     scheme_models,
 )
 from .table_text import ROOT
-from .wake_tables import backward_facing_step, cylinder_wake, wake_models
+from .wake_tables import (
+    backward_facing_step,
+    cylinder_wake,
+    drag_slopes,
+    open_flux,
+    wake_models,
+)
 
 PAGES = ROOT / "docs" / "measured"
 _BLOCK = re.compile(r"(<!-- table ([\w-]+) -->\n).*?(?=^<!-- end -->)", re.MULTILINE | re.DOTALL)
@@ -85,8 +91,10 @@ TABLES: dict[str, Callable[[], str]] = {
         label_models,
         label_samples,
         label_galerkin,
+        open_flux,
         backward_facing_step,
         cylinder_wake,
+        drag_slopes,
         wake_models,
         floating_box,
         light_bodies,

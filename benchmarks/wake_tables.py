@@ -31,6 +31,30 @@ def cylinder_wake() -> str:
     return markdown(header, rows)
 
 
+def drag_slopes() -> str:
+    """Derivatives of mean drag beside central differences."""
+    rows = sorted(results("drag_slopes"), key=lambda row: row["seconds_of_flow"])
+    steps = list(rows[0]["slopes"][0]["deviation_by_difference"])
+    header = ("s of flow", "steps", "mean drag [N]", "in", "slope [N]", "forward off reverse",
+              *(f"off, by {step}" for step in steps))  # fmt: skip
+    return markdown(
+        header,
+        [
+            (
+                f"{row['seconds_of_flow']:g}",
+                str(row["steps"]),
+                short(row["drag"], 4),
+                slope["parameter"],
+                short(slope["drag_per_share"], 4),
+                f"{slope['forward_deviation']:.0e}",
+                *(f"{slope['deviation_by_difference'][step]:.0e}" for step in steps),
+            )
+            for row in rows
+            for slope in row["slopes"]
+        ],
+    )
+
+
 def wake_models() -> str:
     """Reduced models at Reynolds numbers that they have not seen."""
     header = ("M", "closure", "Re", "periods", "Strouhal off by %", "drag %", "lift %",
@@ -59,6 +83,24 @@ def wake_models() -> str:
             results("wake_models"),
             key=lambda row: (row["closure"] != "none", row["modes"], row["reynolds"]),
         )
+    ]
+    return markdown(header, rows)
+
+
+def open_flux() -> str:
+    """What flows through the sections of an open channel, beside what flows in."""
+    header = ("particles across", "Mach", "compressed from end to end", "mass off",
+              "mass, section to section", "volume off", "run [s]")  # fmt: skip
+    names = ("compressed", "mass_off", "mass_lost_on_the_way", "volume_off")
+    rows = [
+        (
+            str(row["resolution"]),
+            f"{row['mach']:g}",
+            *(f"{short(100.0 * row[name])} %" for name in names),
+            f"{row['seconds']:.0f}",
+        )
+        for row in sorted(results("open_flux"), key=lambda row: (row["resolution"], -row["mach"]))
+        if row["fault"] is None
     ]
     return markdown(header, rows)
 

@@ -12,7 +12,7 @@ from .walls import Walls
 _NEAR = 0.25  # times dx: half of where a particle rests beside a wall
 _BESIDE = 1.0  # times dx: of a wall that makes a corner with another
 _CLUMPED = 0.5  # times dx
-_SQUEEZED = 2.0  # times dx: so near to a wall few particles are left between it and a free body
+_SQUEEZED = 3.0  # times dx: so near to a wall two rows are left between it and a free body
 _FAST = 0.3  # of the sound speed: the density changes by the square of it
 _TENSION = 0.01  # of rho0 below it
 _BEYOND = 1.25  # times the step limit, which a flow that is being lost exceeds a little anyway

@@ -8,12 +8,17 @@ from functools import partial
 
 import jax.numpy as jnp
 
+from jaxsph import BallRegion, WallPart
 from jaxsph.effects import Fringe, Varying
-from jaxsph.scenes import Scene, channel_cylinder, poiseuille_open
+from jaxsph.integrate import FaultCode
+from jaxsph.scenes import Scale, Scene, channel_cylinder, cylinder, floating_box, poiseuille_open
+from jaxsph.scenes.open_channel import open_channel
+from jaxsph.scenes.poiseuille_open import LENGTH
+from jaxsph.schemes import SharpAtWalls
 
 from .bounds import PULSED, STOPPED, STRUCK
 from .full_cases import about
-from .judge import Case, Run
+from .judge import Case, Ending, Run
 
 
 def _channel(factor: Callable, end_time: float, precision: str) -> Run:
@@ -36,6 +41,64 @@ def _cylinder(resolution: int, reynolds: float, end_time: float) -> Run:
     return Run(scene, about(scene, 40))
 
 
+def _vortex_leaves(end_time: float) -> Run:
+    """One of twice the inflow's speed, half a radius ahead of the outlet: part of it turns back."""
+    scene = poiseuille_open(16, 1000.0, h_over_dx=1.5, end_time=end_time, dtype="float64")
+    (fringe,) = (effect for effect in scene.effects if isinstance(effect, Fringe))
+    position = scene.state.position
+    apart = (position - jnp.asarray([[LENGTH - 0.1, 0.5]])) / 0.2
+    turn = jnp.exp(0.5 - 0.5 * jnp.sum(apart**2, axis=1))[:, None]
+    around = jnp.stack([-apart[:, 1], apart[:, 0]], axis=1) * turn
+    velocity = fringe.profile(position, jnp.zeros(())) + 2.0 * around
+    state = dataclasses.replace(scene.state, velocity=velocity)
+    return Run(dataclasses.replace(scene, state=state), about(scene, 40))
+
+
+def _near_a_wall(gap: float, end_time: float) -> Run:
+    """A cylinder of 8 particles a diameter, so many of them off the wall of a channel."""
+    body, across = BallRegion((1.5, 0.5 + gap / 8.0), 0.5), 24
+    scene = open_channel(
+        "near-a-wall",
+        length=4.0,
+        fringe=1.5,
+        height=3.0,
+        mean_speed=2.0 / 3.0,
+        obstacle=body,
+        parts=[WallPart("cylinder", body)],
+        scale=Scale(across, 1.5, 1.25e-2, 20),
+        end_time=end_time,
+        viscosity=0.02,
+        mach=0.1,
+        layers=None,
+        arrangement=None,
+        kernel=None,
+        scheme=SharpAtWalls(),
+        dtype="float64",
+        parameters={},
+    )
+    return Run(scene, about(scene, 40))
+
+
+def _in_a_stream(
+    reynolds: float,
+    end_time: float,
+    precision: str,
+    factor: Callable | None = None,
+    time_step: float | None = None,
+) -> Run:
+    """A cylinder, 8 particles a diameter, four diameters to the next."""
+    scene = cylinder(
+        8, reynolds, upstream=2.0, downstream=3.0, width=4.0, end_time=end_time,
+        time_step=time_step, dtype=precision,
+    )  # fmt: skip
+    return Run(scene if factor is None else _varying(scene, factor), about(scene, 40))
+
+
+def _sinking(end_time: float) -> Run:
+    scene = floating_box(density=4000.0, end_time=end_time, dtype="float64")
+    return Run(scene, about(scene, 40))
+
+
 def _steady(time):
     return jnp.ones_like(time)
 
@@ -50,6 +113,14 @@ def _swings(time):
     return jnp.cos(jnp.pi * time)
 
 
+def _turns(time):
+    """Within 4 s."""
+    return jnp.cos(0.25 * jnp.pi * time)
+
+
+# what a body that nears a wall ends in: the contact, or the water between the two
+_PRESSED_OUT = (FaultCode.BODY_MET_WALL, FaultCode.BEYOND_WALL, FaultCode.NEIGHBORS_OUTDATED)
+
 OPEN = (
     Case("open/inflow-stops", "12 across, Re = 10, the inflow stops within 0.5 s, 3 s",
          partial(_channel, _stops, 3.0, "float64"), STOPPED),
@@ -61,4 +132,31 @@ OPEN = (
          partial(_channel, _swings, 3.0, "float32"), PULSED, precision="float32"),
     Case("open/impulsive-start", "a cylinder, 6 particles a diameter, Re = 20, set going at once",
          partial(_cylinder, 25, 20.0, 0.5), STRUCK, slow=True),
+    Case("open/vortex-leaves", "16 across, Re = 1000, twice the inflow's speed in it, 3 s",
+         partial(_vortex_leaves, 3.0), STRUCK, slow=True),
+    Case("open/near-a-wall", "a cylinder, 8 particles a diameter, half of one off the wall, 2 s",
+         partial(_near_a_wall, 4.0, 2.0), STRUCK, slow=True),
+    Case("open/at-a-wall", "the same, one particle off the wall",
+         partial(_near_a_wall, 1.0, 2.0), STRUCK, slow=True),
+    Case("open/re-1000", "a cylinder, 8 particles a diameter, Re = 1000, 6 s from an abrupt start",
+         partial(_in_a_stream, 1000.0, 6.0, "float64"), STRUCK, slow=True),
+    Case("open/cylinder-float32", "single precision, Re = 100, 3 s",
+         partial(_in_a_stream, 100.0, 3.0, "float32"), STRUCK, precision="float32", slow=True),
+    Case("open/stream-turns",
+         "a cylinder at Re = 100, the stream turns round within 4 s, 5 s at half the scene's step",
+         partial(_in_a_stream, 100.0, 5.0, "float64", _turns, 0.01), STRUCK, slow=True),
+    Case("open/stream-turns-own-step", "the same at the scene's own step, 0.67 of 1.5 h / c0",
+         partial(_in_a_stream, 100.0, 5.0, "float64", _turns), STRUCK,
+         (Ending.FINISHED, Ending.FAULT), codes=(FaultCode.DENSITY_OUT_OF_BOUNDS,), slow=True),
+    Case("open/stream-turns-fast", "the same within 1 s: w U L / 2 c0^2 is 0.13 of the density",
+         partial(_in_a_stream, 100.0, 3.0, "float64", _swings), STRUCK,
+         (Ending.FINISHED, Ending.FAULT), codes=(FaultCode.DENSITY_OUT_OF_BOUNDS,), slow=True),
+    Case("open/step-0.80", "a cylinder at Re = 40 set going at once, dt = 0.80 of 1.5 h / c0, 5 s",
+         partial(_in_a_stream, 40.0, 5.4, "float64", None, 0.0225), STRUCK, slow=True),
+    Case("open/step-0.96", "the same, dt = 0.96 of it",
+         partial(_in_a_stream, 40.0, 5.4, "float64", None, 0.027), STRUCK,
+         (Ending.FINISHED, Ending.FAULT), codes=(FaultCode.NEIGHBORS_OUTDATED,), slow=True),
+    Case("open/body-sinks", "a box four times as heavy as water sinks to the floor",
+         partial(_sinking, 1.5), endings=(Ending.FAULT,), says="free body",
+         codes=_PRESSED_OUT, slow=True),
 )  # fmt: skip

@@ -9,9 +9,11 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 
 from ..domain import Box
 from ..effects import Fringe
+from ..shown import concrete
 from ..walls import Region
 from .enclosed import enclosed_flow
 from .scales import Scale
@@ -19,6 +21,7 @@ from .scene import Scene
 from .solution import ExactFlow
 
 _RATE = 0.3  # of a fringe, times h / c0: half of what the longest step stands
+_FASTER = 1.5  # times the speed that the sound's is of
 
 
 def flow_through(
@@ -56,11 +59,14 @@ def flow_through(
         scale, mach, flow: as those of `enclosed_flow`.
 
     Raises:
-        ValueError: as `enclosed_flow`.
+        ValueError: as `enclosed_flow`; for walls that change along the fringe's second half, where
+            the inflow's velocity is held, and for an inflow that is no velocity or too fast.
     """
     spacing = side / scale.resolution
     whole = spacing * math.ceil((length + fringe) / spacing - 1e-9)
     rate = jnp.asarray(_RATE * speed / (mach * scale.h_over_dx * spacing))
+    held = Fringe(inflow, rate, length, whole)
+    _check_even(region, held, across, spacing)
     scene = enclosed_flow(
         name,
         box=Box((0.0, across[0]), (whole, across[1]), (True, periodic)),
@@ -74,10 +80,49 @@ def flow_through(
     )
     state = scene.state
     began = jnp.zeros((), state.position.dtype)
-    flowing = inflow(state.position, began) if start is None else start(state.position)
+    entering = inflow(state.position, began)
+    _check_inflow(entering, state.position, held, speed)
+    flowing = entering if start is None else start(state.position)
     return dataclasses.replace(
         scene,
-        effects=(*scene.effects, Fringe(inflow, rate, length, whole)),
+        effects=(*scene.effects, held),
         state=dataclasses.replace(state, velocity=flowing),
         solution=solution,
     )
+
+
+def _check_even(
+    region: Region, fringe: Fringe, across: tuple[float, float], spacing: float
+) -> None:
+    """A ValueError if walls change along the second half of a fringe."""
+    columns = max(1, int(0.5 * (fringe.end - fringe.start) / spacing))
+    x = fringe.end - spacing * (0.5 + np.arange(columns)[::-1])
+    y = np.arange(across[0] + 0.5 * spacing, across[1], spacing)
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+    distance = np.asarray(region.signed_distance(jnp.asarray(places.reshape(-1, 2))))
+    fluid = (distance < 0.0).reshape(places.shape[:2])
+    changes = np.flatnonzero((fluid != fluid[-1]).any(axis=1))
+    if len(changes):
+        raise ValueError(
+            f"region: its walls change along the fringe, at x = {x[changes[0]]:.4g} m, where the "
+            f"velocity of the inflow is held; let bodies end before {fringe.start:g} m, and walls "
+            f"go on straight to {fringe.end:g} m."
+        )
+
+
+def _check_inflow(velocity, position, fringe: Fringe, speed: float) -> None:
+    """A ValueError if an inflow is no velocity, or too fast for the sound where it is held."""
+    if jnp.shape(velocity) != position.shape:
+        raise ValueError(
+            f"inflow: gives an array of shape {jnp.shape(velocity)} for positions of shape "
+            f"{position.shape}; return a velocity for each."
+        )
+    if not concrete(velocity, position):
+        return
+    there = np.asarray(position)[:, 0] > fringe.start
+    fastest = float(np.linalg.norm(np.asarray(velocity)[there], axis=1).max(initial=0.0))
+    if not fastest <= _FASTER * speed:
+        raise ValueError(
+            f"inflow: is as fast as {fastest:.4g} m/s at the start, and the speed of sound is set "
+            f"by {speed:g} m/s; give its fastest as `speed`."
+        )

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import cylinder_wake
+from benchmarks import cylinder_wake, drag_slopes
 from benchmarks.wake_runs import harmonic
 
 
@@ -41,3 +41,20 @@ def test_a_run_too_short_to_see_lift_swing_is_refused(tmp_path, capsys):
     assert cylinder_wake.main(["--reynolds", "60", "--t-end", "1", "--json", str(file)]) == 2
     assert "--t-end: at least 6 s" in capsys.readouterr().err
     assert not file.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.run_once
+def test_slopes_of_mean_drag_are_those_of_differences(tmp_path):
+    """In the viscosity and in the speed of the inflow, through the full model."""
+    file = tmp_path / "slopes.json"
+    assert drag_slopes.main(["--seconds", "0.2", "--json", str(file)]) == 0
+    (row,) = json.loads(file.read_text())["rows"]
+    assert row["steps"] == 13 and row["drag"] > 1.0
+    assert row["list_built_anew_changes_it_by"] < 1e-12  # the list is no part of the slope
+    for slope in row["slopes"]:
+        assert slope["forward_deviation"] < 1e-10
+        off = slope["deviation_by_difference"]
+        # second order in the share, round-off of drag over it: 1e-9 each, with room
+        assert max(off["1e-05"], off["1e-06"]) < 1e-7, slope
+    assert {slope["parameter"] for slope in row["slopes"]} == {"viscosity", "speed"}
