@@ -16,10 +16,12 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxsph import FullModel, ParticleState, SPHFunctional
 from jaxsph.compiled import full_precision
 from jaxsph.neighbors import NeighborSearch, VerletList, WalledSearch, WallList
+from jaxsph.scenes import Scene
 
 from ..basis import Basis
 from ..points.dynamics.rate_snapshots import rate_modes
 from ..points.dynamics.sampling import Sampling
+from ..points.dynamics.sampling.base import check_count
 from .inputs import Inputs
 from .label_basis import LabelBasis
 from .learning import LabelRun, recover
@@ -29,6 +31,13 @@ from .sampled_system import SampledSystem
 _RATES = 400  # states of all runs together at which rates are taken
 _SEEN = 24  # states at which samples are asked whom they see
 _SLACK = 0.1  # times dx: of the list's skin over what the runs need
+
+
+def check_sampling(sampling: Sampling, scene: Scene) -> None:
+    """Raise a ValueError if there are not so many particles, or walls move."""
+    check_count(sampling.samples, len(scene.state.position))
+    if scene.walls is not None and scene.walls.bodies is not None:
+        raise ValueError("sampling: walls that move have no samples yet; learn tensors instead.")
 
 
 def sample(
@@ -58,11 +67,9 @@ def sample(
         interval: from snapshot to snapshot [s].
 
     Raises:
-        ValueError: as `Sampling.choose` and `recover`, or if walls move.
+        ValueError: as `Sampling.choose` and `recover`.
     """
     functional, size, (count, dim) = inputs.functional, runs[0].coordinates.shape[1], labels.shape
-    if functional.walls is not None and functional.walls.bodies is not None:
-        raise ValueError("sampling: walls that move have no samples yet; learn tensors instead.")
     recovery = jnp.asarray(recover(runs, inputs, interval), labels.dtype)
     whole = _Manifold(*jax.tree.map(jnp.asarray, (motion, density, labels)), recovery, inputs)
     found = [

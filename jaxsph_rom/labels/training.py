@@ -24,7 +24,7 @@ from .label_basis import LabelBasis
 from .label_model import LabelModel
 from .learning import STEPS, LabelRun, error_on, learn
 from .mixing import MIXED, mixed_from
-from .sampling import sample
+from .sampling import check_sampling, sample
 
 _SOUND = 0.5  # of the slowest sound's frequency: what is above is filtered out
 _NYQUIST = 0.9  # of it, at most
@@ -58,8 +58,8 @@ def train(
 
     Raises:
         ValueError: if scenes differ in their particles' places or in what no reduced model can
-            follow, runs are not those of the scenes, labels mix in one of them (it is named), or
-            no system of so many modes stays bounded.
+            follow, runs are not those of the scenes, labels mix in one of them (it is named), no
+            system of so many modes stays bounded, or there can be no such samples.
         SimulationError: if a full run fails.
 
     Examples:
@@ -84,6 +84,8 @@ def train(
     first = scenes[0]
     for one, scene in zip(named, scenes, strict=True):
         _refuse(first, scene, one)
+    if sampling is not None:
+        check_sampling(sampling, first)
     if runs is None:
         runs = [run_scene(scene, measure=None) for scene in scenes]
     _check_runs(scenes, runs, named)

@@ -1,7 +1,7 @@
 """The full functional at a few particles: what it sees, and a wave that it predicts."""
 
 import dataclasses
-from types import SimpleNamespace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +10,8 @@ import pytest
 
 from jaxsph import ParticleState, run_scene
 from jaxsph.metrics import surface_height
-from jaxsph.scenes import standing_wave
+from jaxsph.scenes import piston_wave_maker, standing_wave
 from jaxsph_rom.labels import SampledSystem, load, train
-from jaxsph_rom.labels.sampling import sample
 from jaxsph_rom.points import QDEIM
 
 from .test_training import AMPLITUDES, UNSEEN, make
@@ -86,8 +85,15 @@ def test_a_wave_of_an_unseen_amplitude(tmp_path):
     np.testing.assert_array_equal(again.coordinates, prediction.coordinates)
 
 
-def test_walls_that_move_are_refused():
-    moved = SimpleNamespace(functional=SimpleNamespace(walls=SimpleNamespace(bodies=())))
-    run = SimpleNamespace(coordinates=np.zeros((11, 2)))
-    with pytest.raises(ValueError, match="walls that move have no samples yet; learn tensors"):
-        sample(QDEIM(2), [], [run], np.zeros((5, 2)), None, None, moved, 0.1)
+@pytest.mark.parametrize(
+    ("scene", "resolution", "samples", "message"),
+    [
+        (piston_wave_maker, 60, 4, "walls that move have no samples yet; learn tensors instead"),
+        (standing_wave, 16, 500, "samples: 500 asked for, but there are 1 to 128 points"),
+    ],
+)
+def test_what_has_no_samples_is_refused_before_anything_runs(
+    scene, resolution, samples, message
+):
+    with pytest.raises(ValueError, match=message):
+        train(partial(scene, resolution), [{"mach": 0.1}], sampling=QDEIM(samples))

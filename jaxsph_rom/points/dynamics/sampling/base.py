@@ -26,7 +26,13 @@ class Chosen(NamedTuple):
 
 
 class Sampling(abc.ABC):
-    """A rule that chooses samples; a sample is a point with all its fields."""
+    """A rule that chooses samples; a sample is a point with all its fields.
+
+    Args:
+        samples: how many, or the most.
+    """
+
+    samples: int
 
     @abc.abstractmethod
     def choose(self, basis: Basis, rates: Basis) -> Chosen:
@@ -53,7 +59,10 @@ def check(samples: int, basis: Basis, rates: Basis) -> None:
             f"rates: on {rates.modes.shape[:2]} points and fields, the basis on "
             f"{basis.modes.shape[:2]}; take both on the same reference points."
         )
-    if not 1 <= samples <= len(basis.modes):
-        raise ValueError(
-            f"samples: {samples} asked for, but there are 1 to {len(basis.modes)} points."
-        )
+    check_count(samples, len(basis.modes))
+
+
+def check_count(samples: int, points: int) -> None:
+    """Raise a ValueError where there are not so many points."""
+    if not 1 <= samples <= points:
+        raise ValueError(f"samples: {samples} asked for, but there are 1 to {points} points.")
