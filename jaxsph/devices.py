@@ -116,6 +116,34 @@ class Devices:
         whole = self.whole(field)
         return self.divided(whole.at[places].get(mode="promise_in_bounds", unique_indices=True))
 
+    def rows_for_all(self, field: Array, places: Array) -> Array:
+        """Rows of a divided field by their places, its last row for places beyond; all of them on each
+        device, and no others sent."""
+        last, filled = len(field) - 1, self.filled(field)
+
+        def own(part, places):
+            place = jnp.minimum(places, last) - self.number() * len(part)
+            mine = (place >= 0) & (place < len(part))
+            mine = mine.reshape(-1, *[1] * (part.ndim - 1))
+            return self.sum(jnp.where(mine, part.at[place].get(mode="clip"), 0))
+
+        return self.each(own, (0, None), None)(filled, places)
+
+    def rows_of_all(self, values: Array, places: Array, count: int) -> Array:
+        """A divided field of `count` rows with values, themselves divided, at some different places
+        and zero elsewhere; places beyond are left out."""
+        share = self.share(count)
+
+        def own(values, places):
+            values = lax.all_gather(values, AXIS, tiled=True)
+            place = places - self.number() * share
+            place = jnp.where((place >= 0) & (places < count), place, share)
+            return jnp.zeros((share, *values.shape[1:]), values.dtype).at[place].set(
+                values, mode="drop"
+            )
+
+        return self.divided(self.each(own, (0, None), 0)(values, places)[:count])
+
     def filled(self, field: Array, value: Any = 1) -> Array:
         """A field with rows of a value up to equal shares."""
         beyond = self.share(len(field)) * self.count - len(field)
@@ -151,12 +179,6 @@ class Devices:
             check_vma=False,
         )
 
-    def own_rows_first(self, table: Array) -> Array:
-        """Columns (F, share) of a device's rows -> those of all rows (F, R), its own ones first and
-        then in their order, round the end. Within `each`."""
-        whole = lax.all_gather(table, AXIS, axis=1, tiled=True)
-        return jnp.roll(whole, -self.number() * table.shape[1], axis=1)
-
     def number(self) -> Array:
         """Which device this one is. Within `each`."""
         return lax.axis_index(AXIS)
@@ -164,6 +186,10 @@ class Devices:
     def largest(self, value: Array) -> Array:
         """The largest of all devices. Within `each`."""
         return lax.pmax(value, AXIS)
+
+    def sum(self, value: Array) -> Array:
+        """The sum of those of all devices. Within `each`."""
+        return lax.psum(value, AXIS)
 
     def _sharding(self, spec: Spec) -> NamedSharding:
         return NamedSharding(self.mesh, spec)
