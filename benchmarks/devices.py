@@ -73,13 +73,20 @@ def exchanged(text: str) -> dict[str, int]:
     """Bytes of each type that a compiled program's collectives leave on a device, loops counted
     once."""
     total: dict[str, int] = {}
-    for line in text.splitlines():
-        found = _COLLECTIVE.search(line)
-        for kind, sides in _ARRAY.findall(found[1]) if found else ():
-            bits = 8 if kind == "pred" else int(kind[1:])
-            entries = math.prod(int(side) for side in sides.split(",") if side)
-            total[kind] = total.get(kind, 0) + bits // 8 * entries
+    for _, kind, sides in collectives(text):
+        bits = 8 if kind == "pred" else int(kind[1:])
+        total[kind] = total.get(kind, 0) + bits // 8 * math.prod(sides)
     return total
+
+
+def collectives(text: str) -> list[tuple[str, str, tuple[int, ...]]]:
+    """Of a compiled program, each array that devices tell one another: by what, type and shape."""
+    found = []
+    for line in text.splitlines():
+        by = _COLLECTIVE.search(line)
+        for kind, sides in _ARRAY.findall(by[1]) if by else ():
+            found.append((by[2], kind, tuple(int(side) for side in sides.split(",") if side)))
+    return found
 
 
 def text_of(function: Callable, *given: Any) -> str:

@@ -117,8 +117,8 @@ class Devices:
         return self.divided(whole.at[places].get(mode="promise_in_bounds", unique_indices=True))
 
     def rows_for_all(self, field: Array, places: Array) -> Array:
-        """Rows of a divided field by their places, its last row for places beyond; all of them on each
-        device, and no others sent."""
+        """Rows of a divided field by their places, its last row for places beyond; all of them on
+        each device, and no others sent."""
         last, filled = len(field) - 1, self.filled(field)
 
         def own(part, places):
