@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
+from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding
 from jax.sharding import PartitionSpec as Spec
 from jaxtyping import Array
@@ -82,6 +83,25 @@ class Devices:
     @cached_property
     def mesh(self) -> Mesh:
         return Mesh(np.asarray(self.every), (AXIS,))
+
+    @property
+    def processes(self) -> int:
+        """To so many they belong (`jax.distributed`), which all do the same."""
+        return len({device.process_index for device in self.every})
+
+    @property
+    def write_here(self) -> bool:
+        """Whether this process is the one of theirs that writes files: the first."""
+        return jax.process_index() == min(device.process_index for device in self.every)
+
+    def meet(self, where: str) -> None:
+        """Wait until all their processes have come there."""
+        if self.processes > 1:
+            multihost_utils.sync_global_devices(where)
+
+    def known(self, tree: Any) -> Any:
+        """The same arrays, so that this process has all of them to read."""
+        return self.whole(tree) if self.processes > 1 else tree
 
     def __iter__(self) -> Iterator[jax.Device]:
         return iter(self.every)

@@ -91,7 +91,10 @@ class Halo(Exchange):
             back = [(there, here) for here, there in onward]
             before.append(lax.ppermute(table[:, share - wide :], AXIS, onward))
             after.append(lax.ppermute(table[:, :wide], AXIS, back))
-        return jnp.concatenate([table, *after, *before[::-1]], axis=1)
+        window = jnp.concatenate([table, *after, *before[::-1]], axis=1)
+        # A particle's own place is a free slot of its row: both must be the same number. Were own
+        # columns not read in the window but computed once more, they could be rounded otherwise.
+        return lax.optimization_barrier(window)
 
     def seen(self, place, rows):
         ahead, left_out = self._split(rows)

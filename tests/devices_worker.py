@@ -35,10 +35,10 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 SCENES = {
-    "vortex": lambda: taylor_green(31, h_over_dx=1.3, arrangement=JitteredLattice()),
+    "vortex": lambda: taylor_green(31, h_over_dx=2.0, arrangement=JitteredLattice()),
     "cavity": lambda: lid_driven_cavity(31, h_over_dx=1.3),
     "dam break": lambda: dam_break(64),
-    "vortex in 3D": lambda: taylor_green_3d(19, h_over_dx=1.0, arrangement=JitteredLattice()),
+    "vortex in 3D": lambda: taylor_green_3d(16, h_over_dx=1.0, arrangement=JitteredLattice()),
     "piston": lambda: piston_wave_maker(64),
     "even vortex": lambda: taylor_green(32, h_over_dx=1.3, arrangement=JitteredLattice()),
     "even cavity": lambda: lid_driven_cavity(32, h_over_dx=1.3),

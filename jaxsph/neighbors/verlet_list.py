@@ -47,7 +47,7 @@ class VerletList(eqx.Module):
     def sort(self, field: Array) -> Array:
         """A per-particle field in the list's cell-sorted order."""
         if self.inverse is None:
-            return field
+            return self.exchange.devices.divided(field)
         if self.exchange is not None:
             return self.exchange.devices.take(field, self.order)
         return field.at[self.order].get(mode="promise_in_bounds", unique_indices=True)
@@ -55,7 +55,7 @@ class VerletList(eqx.Module):
     def unsort(self, field: Array) -> Array:
         """A field in cell-sorted order back in the particles' own order."""
         if self.inverse is None:
-            return field
+            return self.exchange.devices.divided(field)
         if self.exchange is not None:
             return self.exchange.devices.take(field, self.inverse)
         return field.at[self.inverse].get(mode="promise_in_bounds", unique_indices=True)
