@@ -36,7 +36,7 @@ def test_two_processes_are_one(name, tmp_path):
         for number in range(2)
     ]  # fmt: skip
     said = [process.communicate(timeout=600) for process in both]
-    assert [process.returncode for process in both] == [0, 0], [errors[-2000:] for _, errors in said]
+    assert [process.returncode for process in both] == [0, 0], [e[-2000:] for _, e in said]
     found, wanted = jaxsph.io.read_trajectory(path), jaxsph.run_scene(scene)
     for field in ("position", "velocity", "density"):
         one, other = getattr(wanted, field), getattr(found, field)
