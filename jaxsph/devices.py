@@ -25,7 +25,7 @@ class Devices:
 
     R rows are divided into equal runs of ceil(R / P), one for each of P devices; the last runs may
     be short or empty, so any number of particles will do. A device lists the neighbours of its own
-    rows and makes their sums; the fields that these read are gathered from all.
+    rows and makes their sums; what these read of other rows is exchanged (`exchange.py`).
 
     Args:
         every: the devices; all of one kind.
