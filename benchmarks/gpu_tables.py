@@ -39,7 +39,9 @@ def devices() -> str:
         count, seconds = row["particles"], row["seconds_of_a_right_hand_side"]
         numbers = row["numbers_for_a_right_hand_side"]
         sent = 8 * (numbers + row["numbers_for_a_list"] / 8)  # a list for eight right-hand sides
-        model = 2 * row["rows_of_a_halo"] * row["columns_of_halos"] / count
+        beside_halos = numbers - row["numbers_in_halos"]
+        columns = row["numbers_were_all_gathered"] - beside_halos  # in the other program
+        model = 2 * row["rows_of_a_halo"] * columns / count
         return (
             f"{row['scene']}, {count:,}",
             f"{row['rows_of_a_device']:,} / {row['rows_of_a_halo']:,}",
