@@ -42,6 +42,6 @@ def test_two_processes_are_one(name, tmp_path):
         one, other = getattr(wanted, field), getattr(found, field)
         np.testing.assert_allclose(other, one, atol=1e-13 * np.abs(one).max(), rtol=0.0)
     alone = fault(scene)
-    assert "particle 77" in alone
+    assert "particle" in alone
     for output, _ in said:
         assert output.splitlines()[-1] == alone
