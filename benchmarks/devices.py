@@ -3,7 +3,7 @@
     XLA_FLAGS=--xla_force_host_platform_device_count=8 python -m benchmarks.devices
 
 Bytes are read in the compiled programs. The devices are parts of one CPU, so times are of a single
-one, on one core if the command is held to it (`taskset -c 0`).
+one, and those that its cores were busy.
 Differences are those between eight devices and one after 200 steps, beside those between one device
 and one device that has the same particles in another order.
 """
@@ -30,23 +30,23 @@ from jaxsph.integrate import integrate
 from jaxsph.neighbors.cell_runs import Sorted
 from jaxsph.scenes import Scene, dam_break, lid_driven_cavity, taylor_green, taylor_green_3d
 
-from .measure import repeated
+from .measure import alternate
 from .table import Table, command
 
 _DEVICES = 8
 _STEPS = 200
 _GRADIENT_STEPS = 6
-_REPEATS = 10
+_REPEATS = 5
 _TRAFFIC = {  # sizes of which a device's share is large beside what is read around it
-    "vortex": lambda: taylor_green(100, arrangement=JitteredLattice()),
-    "vortex in 3D": lambda: taylor_green_3d(20, arrangement=JitteredLattice()),
-    "cavity": lambda: lid_driven_cavity(50),
+    "vortex": lambda: taylor_green(200, arrangement=JitteredLattice()),
+    "vortex in 3D": lambda: taylor_green_3d(40, arrangement=JitteredLattice()),
+    "cavity": lambda: lid_driven_cavity(100),
 }
-SMALL = {
-    "vortex": lambda: taylor_green(18, arrangement=JitteredLattice()),
-    "cavity": lambda: lid_driven_cavity(18),
-    "dam break": lambda: dam_break(40),
-    "vortex in 3D": lambda: taylor_green_3d(12, arrangement=JitteredLattice()),
+SMALL = {  # short supports, so that halos are less than all
+    "vortex": lambda: taylor_green(31, h_over_dx=2.0, arrangement=JitteredLattice()),
+    "cavity": lambda: lid_driven_cavity(31, h_over_dx=1.3),
+    "dam break": lambda: dam_break(64),
+    "vortex in 3D": lambda: taylor_green_3d(16, h_over_dx=1.0, arrangement=JitteredLattice()),
 }
 _COLLECTIVE = re.compile(
     r"= (.*?) (all-gather|all-reduce|collective-permute|all-to-all|reduce-scatter)(?:-start)?\("
@@ -73,13 +73,20 @@ def exchanged(text: str) -> dict[str, int]:
     """Bytes of each type that a compiled program's collectives leave on a device, loops counted
     once."""
     total: dict[str, int] = {}
-    for line in text.splitlines():
-        found = _COLLECTIVE.search(line)
-        for kind, sides in _ARRAY.findall(found[1]) if found else ():
-            bits = 8 if kind == "pred" else int(kind[1:])
-            entries = math.prod(int(side) for side in sides.split(",") if side)
-            total[kind] = total.get(kind, 0) + bits // 8 * entries
+    for _, kind, sides in collectives(text):
+        bits = 8 if kind == "pred" else int(kind[1:])
+        total[kind] = total.get(kind, 0) + bits // 8 * math.prod(sides)
     return total
+
+
+def collectives(text: str) -> list[tuple[str, str, tuple[int, ...]]]:
+    """Of a compiled program, each array that devices tell one another: by what, type and shape."""
+    found = []
+    for line in text.splitlines():
+        by = _COLLECTIVE.search(line)
+        for kind, sides in _ARRAY.findall(by[1]) if by else ():
+            found.append((by[2], kind, tuple(int(side) for side in sides.split(",") if side)))
+    return found
 
 
 def text_of(function: Callable, *given: Any) -> str:
@@ -89,26 +96,28 @@ def text_of(function: Callable, *given: Any) -> str:
 
 def traffic(scene: Scene, devices: Devices) -> Mapping[str, Any]:
     """What each device is sent for one right-hand side and for one list, in numbers a particle."""
-    model, state = scene.model().over(devices), devices.placed(scene.state)
-    neighbors = eqx.filter_jit(model.prepare)(state)
-    zero = jnp.zeros((), state.density.dtype)
-    programs = {
-        "right-hand side": (model.rates, zero, state, neighbors),
-        "list": (model.prepare, state),
-    }
-    count = len(scene.state.density)
-    sent = {
-        key: sum(exchanged(text_of(function, *given)).values()) / (8 * count)
-        for key, (function, *given) in programs.items()
-    }
+    count, dtype = len(scene.state.density), scene.state.density.dtype
+    zero, step = jnp.zeros((), dtype), jnp.asarray(scene.time_step, dtype)
+    model, state, neighbors = _kept(scene, devices)
+    exchange = neighbors.exchange
+    rates = text_of(model.rates, zero, state, neighbors)
+    halos = [math.prod(sides) for by, _, sides in collectives(rates) if by == "collective-permute"]
+    renewed = text_of(model.keep_up, state, neighbors, step)
+    gathering, *kept = _kept(scene, devices, halos=False)
+    gathered = text_of(gathering.rates, zero, *kept)
     tables = (leaf for leaf in jax.tree.leaves(neighbors) if leaf.ndim == 2)
     lists = [leaf for leaf in tables if leaf.dtype == jnp.int32]
     held = sum(leaf.addressable_shards[0].data.nbytes for leaf in lists)
     alone, ready = scene.model(), eqx.filter_jit(scene.model().prepare)(scene.state)
     return {
         "particles": count,
-        "numbers_for_a_right_hand_side": sent["right-hand side"],
-        "numbers_for_a_list": sent["list"],
+        "rows_of_a_device": devices.share(count),
+        "rows_of_a_halo": exchange.depth,
+        "columns_of_halos": sum(halos) / (2 * exchange.depth),
+        "numbers_in_halos": sum(halos) / count,
+        "numbers_for_a_right_hand_side": _numbers(rates, count),
+        "numbers_were_all_gathered": _numbers(gathered, count),
+        "numbers_for_a_list": _numbers(renewed, count),
         "list_bytes": sum(leaf.nbytes for leaf in lists),
         "list_bytes_of_a_device": held,
         "seconds_of_a_right_hand_side": _seconds(alone.rates, zero, scene.state, ready),
@@ -117,15 +126,32 @@ def traffic(scene: Scene, devices: Devices) -> Mapping[str, Any]:
     }
 
 
+def _kept(scene: Scene, devices: Devices, halos: bool = True) -> tuple:
+    """A model, and a state and its list as steps keep them."""
+    model = scene.model().over(devices)
+    if not halos:  # of depths that are not known
+        walled = scene.walls is not None
+        search = dataclasses.replace(model.search.fluid if walled else model.search, depths=())
+        search = dataclasses.replace(model.search, fluid=search) if walled else search
+        model = dataclasses.replace(model, search=search)
+    return model, *eqx.filter_jit(model.begin)(devices.placed(scene.state))
+
+
+def _numbers(text: str, count: int) -> float:
+    """That a program's collectives leave on a device, for each of so many particles."""
+    return sum(exchanged(text).values()) / (8 * count)
+
+
 def _sorted(search, position):
     """What every device does by itself."""
     return Sorted.of(getattr(search, "fluid", search).grid, position)
 
 
 def _seconds(function: Callable, *given: Any) -> float:
-    """On one device, at least."""
+    """Of a processor's cores on one device, at least."""
     program = compiled(lambda *given: function(*given))
-    return min(repeated(lambda: program(*given), _REPEATS)[2])
+    call = {"": lambda: jax.block_until_ready(program(*given))}
+    return min(alternate(call, _REPEATS)[1][""])
 
 
 def differences(scene: Scene, devices: Devices) -> Mapping[str, Any]:

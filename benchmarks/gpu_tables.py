@@ -37,10 +37,17 @@ def devices() -> str:
 
     def line(row: Row) -> tuple[str, ...]:
         count, seconds = row["particles"], row["seconds_of_a_right_hand_side"]
-        sent = 8 * row["numbers_for_a_right_hand_side"]
+        numbers = row["numbers_for_a_right_hand_side"]
+        sent = 8 * (numbers + row["numbers_for_a_list"] / 8)  # a list for eight right-hand sides
+        beside_halos = numbers - row["numbers_in_halos"]
+        columns = row["numbers_were_all_gathered"] - beside_halos  # in the other program
+        model = 2 * row["rows_of_a_halo"] * columns / count
         return (
             f"{row['scene']}, {count:,}",
-            short(sent / 8),
+            f"{row['rows_of_a_device']:,} / {row['rows_of_a_halo']:,}",
+            short(row["numbers_were_all_gathered"]),
+            short(numbers),
+            f"{short(row['numbers_in_halos'])} / {short(model)}",
             short(row["numbers_for_a_list"]),
             f"{short(row['list_bytes'] / 1e6)} / {short(row['list_bytes_of_a_device'] / 1e6)}",
             short(1e6 * seconds / count),
@@ -50,7 +57,8 @@ def devices() -> str:
         )
 
     header = (
-        "particles", "numbers sent for a right-hand side", "for a list",
+        "particles", "rows of a device / of a halo", "numbers sent for a right-hand side: gathered",
+        "by halos", "of these in halos / 2 x halo x columns", "for a list",
         "list, whole / of a device [MB]", "right-hand side [us a particle]",
         "a list [right-hand sides]", "its sort", "4 times as fast from [GB/s]",
     )  # fmt: skip

@@ -50,32 +50,36 @@ def _run(options) -> None:
 def estimate(dim: int, particles: int, devices: int) -> dict[str, Any]:
     """Seconds of a step, and bytes on a device, for so many particles on so many GPUs.
 
-    `gathered` is the program there is: each device is sent the fields of all particles.
-    `exchanged` is one in which it were sent those within a support of its own share, a slab.
+    `gathered`: each is sent the fields of all particles; `exchanged`: halos of its own share, a
+    slab. Either gathers what particles carry, and sorts all on each device, for each list.
     """
     count = counts(dim)
     own, link = particles / devices, LINKS[devices]
     read = SIZE * own * (_PASSES * (count["slots"] + 2 * dim) + count["sent"])
     sums = BEHIND * read / BANDWIDTH + START * count["operations"]
-    list_share = count["list_over_sums"] * sums / (STAGES * STEPS_PER_LIST)
-    beside = 2.0 * count["support"] * particles ** ((dim - 1) / dim)  # of both faces of a slab
+    listing = (count["list_over_sums"] - count["sort_over_sums"]) * sums
+    listing = listing + count["sort_over_sums"] * sums * devices  # of all particles, on each
+    list_share = listing / (STAGES * STEPS_PER_LIST)
+    beside = 2.0 * count["halo"] * particles ** ((dim - 1) / dim)  # of both faces of a slab
     share = 1.0 - 1.0 / devices
+    carried = (2 * dim + 1) * particles * share / (STAGES * STEPS_PER_LIST)
     sent = {
-        "gathered": SIZE * count["sent"] * particles * share,
-        "exchanged": SIZE * count["sent"] * min(beside, particles * share) * (devices > 1),
+        "gathered": SIZE * (count["sent"] * particles * share + carried),
+        "exchanged": SIZE * (count["sent"] * min(beside, particles * share) + carried),
     }
-    alone = STAGES * (sums + list_share)
+    alone = STAGES * sums * (1.0 + count["list_over_sums"] / (STAGES * STEPS_PER_LIST))
+    taken = STAGES * (sums + list_share)
     held = {
         "gathered": count["sent"] * particles,
-        "exchanged": count["sent"] * min(own + beside, particles),
+        "exchanged": count["sent"] * min(own + beside, particles) + (2 * dim + 1) * particles,
     }
     lists = own * (SIZE * count["slots"] + count["temporary"])
     return {
         "dim": dim,
         "particles": particles,
         "devices": devices,
-        **{f"{name}_seconds": alone + STAGES * sent[name] / link for name in sent},
-        **{f"{name}_efficiency": alone / (alone + STAGES * sent[name] / link) for name in sent},
+        **{f"{name}_seconds": taken + STAGES * sent[name] / link for name in sent},
+        **{f"{name}_efficiency": alone / (taken + STAGES * sent[name] / link) for name in sent},
         **{f"{name}_gigabytes": (lists + SIZE * held[name]) / 1e9 for name in held},
         **{f"{name}_fits": bool(lists + SIZE * held[name] <= MEMORY) for name in held},
     }
@@ -83,7 +87,7 @@ def estimate(dim: int, particles: int, devices: int) -> dict[str, Any]:
 
 def counts(dim: int) -> dict[str, float]:
     """Per particle, of a right-hand side: slots of the list, numbers sent, temporary bytes; per
-    right-hand side: operations, and what a list costs of one; the support in spacings."""
+    right-hand side: operations, and what a list and its sort cost of one; a halo in spacings."""
     make, h_over_dx, side, name = _SCENES[dim]
     scene = make(side, 100.0, arrangement=Lattice(), h_over_dx=h_over_dx)
     compiled = next(
@@ -95,11 +99,12 @@ def counts(dim: int) -> dict[str, float]:
                 and row["kind"] == "traffic")  # fmt: skip
     return {
         "slots": scene.search().capacity,
-        "support": scene.space.support / scene.space.spacing,
+        "halo": min(scene.search().depths) / side ** (dim - 1),
         "operations": compiled["operations"],
         "temporary": compiled["temporary_bytes"] / compiled["particles"],
-        "sent": sent["numbers_for_a_right_hand_side"],
+        "sent": sent["columns_of_halos"],
         "list_over_sums": sent["seconds_of_a_list"] / sent["seconds_of_a_right_hand_side"],
+        "sort_over_sums": sent["seconds_of_its_sort"] / sent["seconds_of_a_right_hand_side"],
     }
 
 

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
+from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding
 from jax.sharding import PartitionSpec as Spec
 from jaxtyping import Array
@@ -24,7 +25,7 @@ class Devices:
 
     R rows are divided into equal runs of ceil(R / P), one for each of P devices; the last runs may
     be short or empty, so any number of particles will do. A device lists the neighbours of its own
-    rows and makes their sums; the fields that these read are gathered from all.
+    rows and makes their sums; what these read of other rows is exchanged (`exchange.py`).
 
     Args:
         every: the devices; all of one kind.
@@ -83,6 +84,25 @@ class Devices:
     def mesh(self) -> Mesh:
         return Mesh(np.asarray(self.every), (AXIS,))
 
+    @property
+    def processes(self) -> int:
+        """To so many they belong (`jax.distributed`), which all do the same."""
+        return len({device.process_index for device in self.every})
+
+    @property
+    def write_here(self) -> bool:
+        """Whether this process is the one of theirs that writes files: the first."""
+        return jax.process_index() == min(device.process_index for device in self.every)
+
+    def meet(self, where: str) -> None:
+        """Wait until all their processes have come there."""
+        if self.processes > 1:
+            multihost_utils.sync_global_devices(where)
+
+    def known(self, tree: Any) -> Any:
+        """The same arrays, so that this process has all of them to read."""
+        return self.whole(tree) if self.processes > 1 else tree
+
     def __iter__(self) -> Iterator[jax.Device]:
         return iter(self.every)
 
@@ -115,6 +135,34 @@ class Devices:
         """Rows of a field by their places, which are all different."""
         whole = self.whole(field)
         return self.divided(whole.at[places].get(mode="promise_in_bounds", unique_indices=True))
+
+    def rows_for_all(self, field: Array, places: Array) -> Array:
+        """Rows of a divided field by their places, its last row for places beyond; all of them on
+        each device, and no others sent."""
+        last, filled = len(field) - 1, self.filled(field)
+
+        def own(part, places):
+            place = jnp.minimum(places, last) - self.number() * len(part)
+            mine = (place >= 0) & (place < len(part))
+            mine = mine.reshape(-1, *[1] * (part.ndim - 1))
+            return self.sum(jnp.where(mine, part.at[place].get(mode="clip"), 0))
+
+        return self.each(own, (0, None), None)(filled, places)
+
+    def rows_of_all(self, values: Array, places: Array, count: int) -> Array:
+        """A divided field of `count` rows with values, themselves divided, at some different places
+        and zero elsewhere; places beyond are left out."""
+        share = self.share(count)
+
+        def own(values, places):
+            values = lax.all_gather(values, AXIS, tiled=True)
+            place = places - self.number() * share
+            place = jnp.where((place >= 0) & (places < count), place, share)
+            return jnp.zeros((share, *values.shape[1:]), values.dtype).at[place].set(
+                values, mode="drop"
+            )
+
+        return self.divided(self.each(own, (0, None), 0)(values, places)[:count])
 
     def filled(self, field: Array, value: Any = 1) -> Array:
         """A field with rows of a value up to equal shares."""
@@ -151,12 +199,6 @@ class Devices:
             check_vma=False,
         )
 
-    def own_rows_first(self, table: Array) -> Array:
-        """Columns (F, share) of a device's rows -> those of all rows (F, R), its own ones first and
-        then in their order, round the end. Within `each`."""
-        whole = lax.all_gather(table, AXIS, axis=1, tiled=True)
-        return jnp.roll(whole, -self.number() * table.shape[1], axis=1)
-
     def number(self) -> Array:
         """Which device this one is. Within `each`."""
         return lax.axis_index(AXIS)
@@ -164,6 +206,10 @@ class Devices:
     def largest(self, value: Array) -> Array:
         """The largest of all devices. Within `each`."""
         return lax.pmax(value, AXIS)
+
+    def sum(self, value: Array) -> Array:
+        """The sum of those of all devices. Within `each`."""
+        return lax.psum(value, AXIS)
 
     def _sharding(self, spec: Spec) -> NamedSharding:
         return NamedSharding(self.mesh, spec)

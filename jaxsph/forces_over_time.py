@@ -91,6 +91,17 @@ class ForcesOverTime(Model):
     def refresh(self, auxiliary, state, time_step):
         return self.model.refresh(auxiliary, state.particles, time_step)
 
+    def begin(self, state):
+        particles, auxiliary = self.model.begin(state.particles)
+        return dataclasses.replace(state, particles=particles), auxiliary
+
+    def keep_up(self, state, auxiliary, time_step):
+        particles, auxiliary = self.model.keep_up(state.particles, auxiliary, time_step)
+        return dataclasses.replace(state, particles=particles), auxiliary
+
+    def end(self, state, auxiliary):
+        return dataclasses.replace(state, particles=self.model.end(state.particles, auxiliary))
+
     def finish(self, state):
         return dataclasses.replace(state, particles=self.model.finish(state.particles))
 

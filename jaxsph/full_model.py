@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -60,10 +61,38 @@ class FullModel(Model):
         return self._beside(state).search.build(state.position)
 
     def refresh(self, auxiliary, state, time_step):
+        search, motion = self._motion(state, time_step)
+        return refresh_list(search, auxiliary, state.position, motion)
+
+    def _motion(self, state, time_step):
+        """The search where its ghosts are, and how far [m] a particle may move in a step."""
         speed = self._largest_speed(state)
         speed = speed + SHIFT_SHARE * self.functional.fluid.reference_speed
         search = self._beside(state).search
-        return refresh_list(search, auxiliary, state.position, speed * time_step)
+        return search, speed * time_step
+
+    def begin(self, state):
+        neighbors = self.prepare(state)
+        if self.search.devices is None:
+            return state, neighbors
+        return _arranged(state, neighbors.sort), neighbors.in_place()
+
+    def keep_up(self, state, auxiliary, time_step):
+        if self.search.devices is None:
+            return state, self.refresh(auxiliary, state, time_step)
+        search, motion = self._motion(state, time_step)
+
+        def rebuilt(state, neighbors):
+            new = search.build(state.position)
+            return _arranged(state, new.sort), new.in_place(neighbors.order)
+
+        outdated = is_outdated(search, auxiliary, state.position, motion)
+        return lax.cond(outdated, rebuilt, lambda *same: same, state, auxiliary)
+
+    def end(self, state, auxiliary):
+        if self.search.devices is None:
+            return state
+        return _arranged(state, auxiliary.by_number)
 
     def rates(self, time, state, auxiliary):
         return self.functional(time, state, auxiliary)
@@ -78,8 +107,8 @@ class FullModel(Model):
         return Fault.first_of(
             step,
             *body_checks(walls),
-            *wall_checks(walls, state.position),
-            *field_checks(state, here.functional.fluid.reference_density),
+            *wall_checks(walls, state.position, auxiliary.first),
+            *field_checks(state, here.functional.fluid.reference_density, auxiliary.first),
             *list_checks(here.search, auxiliary, state.position),
         )
 
@@ -151,9 +180,20 @@ class FullModel(Model):
 
 def refresh_list(search, neighbors: VerletList | WallList, position, motion):
     """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
-    moved = search.largest_motion(neighbors, position)[0]
-    outdated = moved + lax.stop_gradient(motion) > 0.5 * search.skin
+    outdated = is_outdated(search, neighbors, position, motion)
     return lax.cond(outdated, lambda x: search.build(x), lambda _: neighbors, position)
+
+
+def is_outdated(search, neighbors: VerletList | WallList, position, motion):
+    """Whether particles that move on by up to `motion` [m] would outrun the list's skin."""
+    moved = search.largest_motion(neighbors, position)[0]
+    return moved + lax.stop_gradient(motion) > 0.5 * search.skin
+
+
+def _arranged(state: ParticleState, order: Callable) -> ParticleState:
+    """A state with its particles in another order."""
+    particles = jax.tree.map(order, dataclasses.replace(state, bodies=None))
+    return dataclasses.replace(particles, bodies=state.bodies)
 
 
 def list_checks(search, neighbors: VerletList | WallList, position):
@@ -183,21 +223,22 @@ def body_checks(walls: Walls | None):
     )
 
 
-def wall_checks(walls: Walls | None, position):
-    """The check that no particle has gone through a wall, where there are walls."""
+def wall_checks(walls: Walls | None, position, first: Callable = jnp.argmax):
+    """The check that no particle has gone through a wall, where there are walls; `first` is the
+    number of the first particle of those marked."""
     if walls is None:
         return ()
     beyond = walls.beyond(lax.stop_gradient(position))
-    return ((FaultCode.BEYOND_WALL, jnp.any(beyond), jnp.argmax(beyond)),)
+    return ((FaultCode.BEYOND_WALL, jnp.any(beyond), first(beyond)),)
 
 
-def field_checks(state: ParticleState, reference_density):
-    """Checks that all is finite and every density within its bounds."""
+def field_checks(state: ParticleState, reference_density, first: Callable = jnp.argmax):
+    """Checks that all is finite and every density within its bounds, `first` as for walls."""
     total = state.density + jnp.sum(state.velocity, axis=1) + jnp.sum(state.position, axis=1)
     wild = ~jnp.isfinite(total)
     ratio = state.density / reference_density
     out = (ratio < DENSITY_BOUNDS[0]) | (ratio > DENSITY_BOUNDS[1])
     return (
-        (FaultCode.NOT_FINITE, jnp.any(wild), jnp.argmax(wild)),
-        (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), jnp.argmax(out)),
+        (FaultCode.NOT_FINITE, jnp.any(wild), first(wild)),
+        (FaultCode.DENSITY_OUT_OF_BOUNDS, jnp.any(out), first(out)),
     )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import jax
 
 from .content import content
+from .devices import Devices
 from .integrate import Model
 from .io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
 from .simulate import first_doubt, simulate
@@ -28,6 +29,8 @@ def kept_run(
     **options: Any,
 ) -> Trajectory:
     """The trajectory in the file at `path`, run as far as it is not there yet.
+
+    Where `devices` of several processes run it, all of these see the file, and one writes it.
 
     Args:
         path: of the trajectory file.
@@ -51,28 +54,20 @@ def kept_run(
         return _whole(path, scene)
     made = model()
     metadata = {"scene": scene.name, "parameters": scene.parameters}
+    given = options.get("devices")
+    devices = Devices(jax.local_devices()[:1] if given is None else given)
+    begun = read_trajectory(path) if done else None
+    devices.meet("before a run is written")
+    writer = _gone_on_with(path, begun) if done and devices.write_here else None
     if done:
-        begun, writer = read_trajectory(path), TrajectoryWriter.append_to(path)
-        if writer.last_step != begun.metadata["steps"]:
-            writer.close()
-            raise _disturbed(path)
         state = restore(begun)
         if options.get("watch") is not None:
             metadata |= first_doubt(options["watch"], begun)
     else:
         state = start(made)
-        coordinates = jax.eval_shape(made.observe, state).coordinates
-        modes = None if coordinates is None else coordinates.shape[0]
-        writer = TrajectoryWriter.create(
-            path,
-            scene,
-            modes=modes,
-            made_by=wanted,
-            overwrite=done is not None,
-            forces=options.get("measure"),
-            averaged=options.get("averaged"),
-        )
-    with writer, progress(done or 0) as report:
+        if devices.write_here:
+            writer = _begun(path, scene, made, state, done is not None, wanted, options)
+    with writer or nullcontext(), progress(done or 0) as report:
         part = simulate(
             made,
             state,
@@ -83,8 +78,33 @@ def kept_run(
             metadata=metadata,
             **options,
         )
-        writer.finish(part.metadata)
+        if writer is not None:
+            writer.finish(part.metadata)
+    devices.meet("after a run was written")
     return _whole(path, scene)
+
+
+def _gone_on_with(path: Path, begun: Trajectory) -> TrajectoryWriter:
+    """A writer of the file that held so much when it was read."""
+    writer = TrajectoryWriter.append_to(path)
+    if writer.last_step != begun.metadata["steps"]:
+        writer.close()
+        raise _disturbed(path)
+    return writer
+
+
+def _begun(path: Path, scene, made: Model, state, overwrite: bool, wanted, options):
+    """A writer of a new file for a run from that state."""
+    coordinates = jax.eval_shape(made.observe, state).coordinates
+    return TrajectoryWriter.create(
+        path,
+        scene,
+        modes=None if coordinates is None else coordinates.shape[0],
+        made_by=wanted,
+        overwrite=overwrite,
+        forces=options.get("measure"),
+        averaged=options.get("averaged"),
+    )
 
 
 def steps_done(path: Path, wanted: Mapping[str, str]) -> int | None:

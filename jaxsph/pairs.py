@@ -209,14 +209,14 @@ def pair_sum(
     for name, width in layout:
         columns += [fields[name][:, k] for k in range(width)] if width else [fields[name]]
     function = _Composed(terms, space, layout)
-    devices, count = neighbors.devices, len(columns[0])
-    if devices is not None:
-        columns = [devices.filled(column) for column in columns]
+    exchange, count = neighbors.exchange, len(columns[0])
+    if exchange is not None:
+        columns = [exchange.devices.filled(column) for column in columns]
     outputs = pair_sum_p.bind(
-        neighbors.index, *columns, function=function, rows=rows, mapped=(), devices=devices
+        neighbors.index, *columns, function=function, rows=rows, mapped=(), exchange=exchange
     )
-    if devices is not None and rows is None:
-        outputs = devices.divided([o[:count] for o in outputs])
+    if exchange is not None and rows is None:
+        outputs = exchange.devices.divided([o[:count] for o in outputs])
     sums, start = {}, 0
     for term, width in zip(terms, function.widths(columns[0].dtype), strict=True):
         if width:
@@ -320,10 +320,10 @@ def _one_by_one(index, *columns, function, rows, mapped):
     return list(lax.map(member, [arguments[k] for k in mapped]) if mapped else member([]))
 
 
-def _abstract(index, *columns, function, rows, mapped, devices):
+def _abstract(index, *columns, function, rows, mapped, exchange):
     probe = [jax.ShapeDtypeStruct((1, 1), c.dtype) for c in columns]
     outputs = jax.eval_shape(lambda *c: function(c, c), *probe)
-    shares = 1 if devices is None else devices.count
+    shares = 1 if exchange is None else exchange.devices.count
     count = index.shape[-2] if rows is None else shares * (rows[1] - rows[0])
     members = [(index, *columns)[k].shape[0] for k in mapped[:1]]
     return [jax.core.ShapedArray((*members, count), o.dtype) for o in outputs]
@@ -341,7 +341,7 @@ def _jvp(primals, tangents, *, function, mapped, **same):
     return outputs, pair_sum_p.bind(*primals, *moved, function=linear, mapped=mapped, **same)
 
 
-def _transpose(cotangents, index, *columns, function, rows, mapped, devices):
+def _transpose(cotangents, index, *columns, function, rows, mapped, exchange):
     primals = columns[: function.count]
     linear = columns[function.count :]
     if any(map(ad.is_undefined_primal, primals)) or not all(map(ad.is_undefined_primal, linear)):
@@ -352,13 +352,13 @@ def _transpose(cotangents, index, *columns, function, rows, mapped, devices):
         flipped = Linearised(function.function, function.active, function.count)
     cotangents = [ad.instantiate_zeros(c) for c in cotangents]
     if rows is not None:  # a sum that was not wanted has no cotangent
-        cotangents = without_others(cotangents, rows, index.shape[-2], devices)
+        cotangents = without_others(cotangents, rows, index.shape[-2], exchange)
     start = 1 + function.count
     own = tuple(k for k in mapped if k < start)
     every = tuple(range(start, start + len(cotangents))) if mapped else ()
     outputs = pair_sum_p.bind(
         index, *primals, *cotangents, function=flipped, rows=None, mapped=own + every,
-        devices=devices,
+        exchange=exchange,
     )  # fmt: skip
     outputs = [  # what members share has a share of each
         jnp.sum(o, axis=0) if mapped and k not in mapped else o
@@ -386,7 +386,7 @@ def _batch(arguments, axes, *, mapped, **same):
 
 
 pair_sum_p.def_impl(
-    jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped", "devices"))
+    jax.jit(pair_sum_p.bind, static_argnames=("function", "rows", "mapped", "exchange"))
 )
 pair_sum_p.def_abstract_eval(_abstract)
 mlir.register_lowering(pair_sum_p, lowered(pair_sum_p, mlir.lower_fun(_one_by_one)))

@@ -99,7 +99,8 @@ def simulate(
             `doubt_time` [s].
         devices: that run a full model together, each its share of the particles and of their
             neighbours, as `jax.devices()`; results differ by rounding. One device if none are
-            given.
+            given. Devices of several processes (`jax.distributed`) will do, if all call this alike;
+            the first of these alone tells `recorder`.
 
     Raises:
         ValueError: if no whole interval is left to run, or `devices` are given for a model that one
@@ -121,12 +122,15 @@ def simulate(
             f"first_step: from {first_step} to {schedule.steps} must be a whole, positive number "
             f"of intervals of {each} steps."
         )
-    if devices is not None:
-        shared = Devices(devices)
+    shared = None if devices is None else Devices(devices)
+    if shared is not None:
         model, state = model.over(shared), shared.placed(state)
     dtype = jax.tree.leaves(eqx.filter(state, eqx.is_inexact_array))[0].dtype
     dt = jnp.asarray(time_step, dtype)
     records, times, metadata = [], [], dict(metadata or {})
+
+    def known(tree):
+        return tree if shared is None else shared.known(tree)
 
     def record(step, snapshot, means=None):
         if measure is not None:
@@ -135,14 +139,14 @@ def simulate(
         if averaged is not None:
             means = means or averaged(model, jnp.asarray(step * time_step, dtype), state)
             snapshot = dataclasses.replace(snapshot, **dict(zip(_MEANS, means, strict=True)))
-        snapshot = jax.tree.map(np.asarray, snapshot)
+        snapshot = jax.tree.map(np.asarray, known(snapshot))
         particle = _lost(snapshot)
         if particle is not None:
             fault = Fault(FaultCode.NOT_FINITE, step, particle)
             raise _failed(fault)
         records.append(snapshot)
         times.append(step * time_step)
-        if recorder is not None:
+        if recorder is not None and (shared is None or shared.write_here):
             recorder.append(step, step * time_step, snapshot)
         if watch is not None and "doubt" not in metadata:
             found = doubt(watch, step * time_step, snapshot)
@@ -201,7 +205,7 @@ def simulate(
                 enlarged_at.append(int(fault.step))
                 continue
         if int(fault.code) != FaultCode.NONE:
-            raise _failed(fault, model.likely_cause(fault, new, time_step))
+            raise _failed(fault, model.likely_cause(fault, known(new), time_step))
         run_seconds += elapsed
         state, step = new, step + each
         record(step, snapshot, means)

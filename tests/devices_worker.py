@@ -6,6 +6,7 @@
 import contextlib
 import dataclasses
 import json
+import math
 import sys
 import warnings
 from pathlib import Path
@@ -16,9 +17,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxsph
-from benchmarks.devices import exchanged, text_of
+from benchmarks.devices import collectives, exchanged, text_of
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.compiled import compiled
+from jaxsph.exchange import Gathered, Halo
 from jaxsph.integrate import AutomaticSteps, integrate
 from jaxsph.scenes import (
     dam_break,
@@ -33,11 +35,16 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 SCENES = {
-    "vortex": lambda: taylor_green(18, arrangement=JitteredLattice()),
-    "cavity": lambda: lid_driven_cavity(18),
-    "dam break": lambda: dam_break(40),
-    "vortex in 3D": lambda: taylor_green_3d(12, arrangement=JitteredLattice()),
+    "vortex": lambda: taylor_green(31, h_over_dx=2.0, arrangement=JitteredLattice()),
+    "cavity": lambda: lid_driven_cavity(31, h_over_dx=1.3),
+    "dam break": lambda: dam_break(64),
+    "vortex in 3D": lambda: taylor_green_3d(16, h_over_dx=1.0, arrangement=JitteredLattice()),
     "piston": lambda: piston_wave_maker(64),
+    "even vortex": lambda: taylor_green(32, h_over_dx=1.3, arrangement=JitteredLattice()),
+    "even cavity": lambda: lid_driven_cavity(32, h_over_dx=1.3),
+    # too small for halos
+    "small vortex": lambda: taylor_green(18, arrangement=JitteredLattice()),
+    "small cavity": lambda: lid_driven_cavity(18),
 }
 DEVICES = jaxsph.Devices(jax.devices())
 FIELDS = ("position", "velocity", "density")
@@ -51,6 +58,30 @@ def relative(one, other):
 
 def apart(one, other):
     return {name: relative(getattr(one, name), getattr(other, name)) for name in FIELDS}
+
+
+def exchange(scene):
+    """Of which kind, and how deep beside a device's share."""
+    count = len(scene.state.density)
+    search = scene.model().over(DEVICES).search
+    found = getattr(search, "fluid", search).exchange(count)
+    return {"kind": type(found).__name__, "sent": found.sent(count), "share": DEVICES.share(count)}
+
+
+def window(scene):
+    """Of a table whose rows are numbers: those that a device sees, at places that it is told."""
+    rows, wrong = 5 * DEVICES.count, 0
+    number = jnp.arange(rows, dtype=jnp.int32)
+    for way in (Gathered(DEVICES), *(Halo(DEVICES, depth) for depth in (1, 4, 5, 7, 10, 17))):
+        def shown(table, way=way):
+            ring = (number + 5 * DEVICES.number()) % rows  # from its first row on
+            place, seen = way.seen(number, rows)
+            read = way.window(table)[0].at[place].get(mode="clip")
+            same = (way.among_all(place, rows) == number) & (read == ring)
+            return jnp.stack([jnp.sum(seen & ~same), jnp.sum(seen) - 5 - way.sent(rows)])[None]
+
+        wrong += int(jnp.sum(jnp.abs(DEVICES.each(shown, (1,), 0)(number[None]))))
+    return {"wrong": wrong}
 
 
 def run(scene, steps):
@@ -125,6 +156,12 @@ def ways(scene):
     both("members", lambda model: eqx.filter_jit(
         lambda m, s: jax.vmap(lambda s: rates(m, s))(s))(model, members))  # fmt: skip
     both("eager", lambda model: rates(model, state))
+
+    def in_place(model, state):  # as steps keep particles
+        state, neighbors = model.begin(state)
+        return model.end(model.rates(zero, state, neighbors), neighbors)
+
+    both("in place", lambda model: eqx.filter_jit(in_place)(model, state))
     near, list_of_one = (
         m.prepare(state).closest(scene.space.box, state.position)
         for m in (model.over(DEVICES), model)
@@ -133,11 +170,13 @@ def ways(scene):
     return found
 
 
-def faults(scene):
-    """A list too small is made larger; a particle thrown out is the one that one device names."""
+def faults(scene, limit):
+    """A list or a halo too small is made larger; a particle thrown out is the one of one device."""
     model = scene.model()
+    fluid = model.search.fluid
+    room = {"capacity": fluid.capacity // 2} if limit == "list" else {"depths": (60, 60)}
     tight = eqx.tree_at(lambda m: m.search, model, dataclasses.replace(
-        model.search, fluid=dataclasses.replace(model.search.fluid, capacity=20)
+        model.search, fluid=dataclasses.replace(fluid, **room)
     ))  # fmt: skip
     schedule = jaxsph.Schedule(scene.time_step, 2, 1)
     with warnings.catch_warnings(record=True) as told:
@@ -187,6 +226,42 @@ def traffic(scene):
     sent = exchanged(text_of(model.rates, zero, state, neighbors))
     share = index.addressable_shards[0].data.nbytes / index.nbytes
     return {"share_of_list": share, **{kind: n / len(state.density) for kind, n in sent.items()}}
+
+
+def halos(scene):
+    """What devices tell one another of particles that lie in place, for a right-hand side and for
+    its gradient: columns of halos, and how many other arrays have a row for each particle."""
+    model, state = scene.model().over(DEVICES), DEVICES.placed(scene.state)
+    state, neighbors = eqx.filter_jit(model.begin)(state)
+    zero, depth = jnp.zeros(()), neighbors.exchange.depth
+
+    def slope(model, state, neighbors):
+        return jax.grad(lambda s: jnp.sum(model.rates(zero, s, neighbors).velocity ** 2))(state)
+
+    rates = columns_and_others(text_of(model.rates, zero, state, neighbors), depth)
+    gradient = columns_and_others(text_of(slope, model, state, neighbors), depth)
+    rows = len(state.density)
+    whole = [sides for _, others in (rates, gradient) for sides in others if rows in sides]
+    return {"columns": rates[0], "columns_of_gradient": gradient[0], "whole": len(whole)}
+
+
+def run_halos(scene):
+    """The same of a run of several steps, its lists included; and numbers of other arrays."""
+    model, state = scene.model().over(DEVICES), DEVICES.placed(scene.state)
+
+    def run(model, state):
+        return integrate(model, state, jnp.asarray(0), jnp.asarray(scene.time_step), 3, 1)[0]
+
+    count = len(state.density)
+    depth = model.search.exchange(count).depth
+    columns, others = columns_and_others(text_of(run, model, state), depth)
+    return {"columns": columns, "others": sum(map(math.prod, others)) / count}
+
+
+def columns_and_others(text, depth):
+    sent = collectives(text)
+    halos = sum(math.prod(sides) for by, _, sides in sent if by == "collective-permute")
+    return halos / (2 * depth), [sides for by, _, sides in sent if by != "collective-permute"]
 
 
 if __name__ == "__main__":

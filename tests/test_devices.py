@@ -51,15 +51,18 @@ def lowered(model, state):
 
 
 def test_eight_devices_are_one():
-    """18 x 18 particles divide into no eight equal shares; their list is rebuilt on the way."""
+    """31 x 31 particles divide into no eight equal shares; their list is rebuilt on the way."""
     difference = found("run", "vortex", 12)
     assert difference.pop("way_over_half_skin") > 1.0  # so a list was built in mid-run
     assert all(0.0 <= d < ROUND_OFF for d in difference.values()), difference
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", ["vortex", "cavity", "dam break", "vortex in 3D"])
+@pytest.mark.parametrize(
+    "scene", ["vortex", "cavity", "dam break", "vortex in 3D", "small vortex", "small cavity"]
+)
 def test_eight_devices_are_one_over_200_steps(scene):
+    assert found("exchange", scene)["kind"] == ("Gathered" if "small" in scene else "Halo")
     difference = found("run", scene, 200, soon=False)
     assert difference.pop("way_over_half_skin") > 1.0
     assert difference["density"] < ROUND_OFF
@@ -87,8 +90,9 @@ def test_forward_mode_members_and_eager_calls():
 
 
 @pytest.mark.slow
-def test_a_list_that_overflows_is_enlarged_and_a_fault_names_the_same_particle():
-    assert found("faults", "cavity") == {"enlarged": True, "same": True}
+@pytest.mark.parametrize("limit", ["list", "halo"])
+def test_what_overflows_is_enlarged_and_a_fault_names_the_same_particle(limit):
+    assert found("faults", "cavity", limit) == {"enlarged": True, "same": True}
 
 
 @pytest.mark.slow
@@ -105,10 +109,35 @@ def test_without_devices_no_program_knows_of_them():
     assert "shard" in lowered(model.over(jaxsph.Devices(jax.devices()[:1])), scene.state)
 
 
+def test_a_window_shows_the_rows_that_it_says():
+    """Halos within the next device's rows, of just these, and deeper."""
+    assert found("window", "vortex") == {"wrong": 0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["even vortex", "even cavity"])
+def test_no_field_of_all_particles_is_sent_for_a_right_hand_side(scene):
+    """25 columns are read, of halos alone; the gradient sends more of these and nothing else. At
+    walls there are arrays with a row for each particle near them."""
+    sent = found("halos", scene)
+    assert sent["columns"] == 25.0
+    assert sent["columns_of_gradient"] > 25.0
+    assert sent["whole"] == 0
+
+
+@pytest.mark.slow
+def test_a_run_gathers_states_only_where_lists_are_built_and_at_its_ends():
+    """5 numbers a particle where it begins, where it ends, where its list is built anew, and where
+    it is handed over; whatever is sent for right-hand sides comes on top."""
+    sent = found("run_halos", "vortex")
+    assert sent["columns"] == 25.0
+    assert sent["others"] < 1.05 * 4 * 5
+
+
 @pytest.mark.slow
 def test_the_list_is_divided_and_not_moved():
     """Each device has its rows; for a right-hand side it is sent fields of particles alone."""
-    sent = found("traffic", "cavity")
+    sent = found("traffic", "small cavity")
     assert sent.pop("share_of_list") == pytest.approx(1.0 / 8.0)
     numbers = sent.pop("f64") / 8.0  # a particle
     assert 20.0 < numbers < 200.0

@@ -41,6 +41,22 @@ class Model(eqx.Module):
         """The auxiliary structure, rebuilt if it would not last another step."""
         return auxiliary
 
+    def begin(self, state: Any) -> tuple[Any, Any]:
+        """A state as steps keep it, and the auxiliary structure for it, built anew.
+
+        Steps keep a state as it is unless a model that several devices run arranges it otherwise;
+        `rates`, `finish`, `inspect` and limits are then asked of such a state.
+        """
+        return state, self.prepare(state)
+
+    def keep_up(self, state: Any, auxiliary: Any, time_step: Float[Array, ""]) -> tuple[Any, Any]:
+        """The same during the steps: what `refresh` gives, and the state arranged for it."""
+        return state, self.refresh(auxiliary, state, time_step)
+
+    def end(self, state: Any, auxiliary: Any) -> Any:
+        """A state that steps have kept as it was given to them."""
+        return state
+
     def finish(self, state: Any) -> Any:
         """A state as a step leaves it (positions wrapped into the box)."""
         return state

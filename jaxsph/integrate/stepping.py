@@ -48,14 +48,15 @@ class Stepping(eqx.Module):
 
 
 def _step(stepper: Stepper, model: Model, state, auxiliary, number, time, time_step):
-    """One step, checked: the last good state, the auxiliary structure and the fault."""
-    auxiliary = model.at(time).refresh(auxiliary, state, time_step)
+    """One step, checked: the last good state, the auxiliary structure, the fault, and the state
+    before it."""
+    state, auxiliary = model.at(time).keep_up(state, auxiliary, time_step)
     new = stepper.step(lambda t, y: model.rates(t, y, auxiliary), time, state, time_step)
     new = model.finish(new)
     fault = model.at(time + time_step).inspect(number, new, auxiliary)
     good = fault.code == int(FaultCode.NONE)
     kept = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, state)
-    return kept, auxiliary, fault
+    return kept, auxiliary, fault, state
 
 
 @final
@@ -73,16 +74,16 @@ class FixedSteps(Stepping):
             def move(carry):
                 state, auxiliary, _ = carry
                 time = (number - 1).astype(time_step.dtype) * time_step
-                return _step(self.stepper, model, state, auxiliary, number, time, time_step)
+                return _step(self.stepper, model, state, auxiliary, number, time, time_step)[:3]
 
             good = carry[2].code == int(FaultCode.NONE)
             return lax.cond(good, move, lambda carry: carry, carry)
 
         numbers = start + 1 + jnp.arange(steps, dtype=jnp.int32)
         began = start.astype(time_step.dtype) * time_step
-        carry = (state, model.at(began).prepare(state), fault)
-        state, _, fault = checkpointed_scan(step, carry, numbers, segment)
-        return state, fault
+        carry = (*model.at(began).begin(state), fault)
+        state, auxiliary, fault = checkpointed_scan(step, carry, numbers, segment)
+        return model.end(state, auxiliary), fault
 
 
 @final
@@ -120,17 +121,20 @@ class AutomaticSteps(Stepping):
             step = left / jnp.ceil(left / model.at(time).step_limit(state, change))
             step = jnp.where(jnp.isfinite(step), step, time_step)  # the step's checks name the rest
             number = start + jnp.ceil((elapsed + step) / time_step - _ENDED).astype(jnp.int32)
-            new, auxiliary, fault = _step(self.stepper, model, state, auxiliary, number, time, step)
+            new, auxiliary, fault, state = _step(
+                self.stepper, model, state, auxiliary, number, time, step
+            )
             return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
 
         def step(carry, _):
             return lax.cond(going(carry), move, lambda carry: carry, carry)
 
         zero = jnp.zeros((), time_step.dtype)
-        carry = (state, model.at(began).prepare(state), fault, zero, zero)
+        carry = (*model.at(began).begin(state), fault, zero, zero)
         carry = checkpointed_scan(step, carry, jnp.arange(self.most * steps), segment)
-        state, _, fault, elapsed, _ = carry
+        state, auxiliary, fault, elapsed, _ = carry
         short = going(carry)
         number = start + jnp.ceil(elapsed / time_step).astype(jnp.int32)
         out = Fault.first_of(number, (FaultCode.STEPS_EXHAUSTED, short, -1))
-        return state, jax.tree.map(lambda a, b: jnp.where(short, a, b), out, fault)
+        fault = jax.tree.map(lambda a, b: jnp.where(short, a, b), out, fault)
+        return model.end(state, auxiliary), fault

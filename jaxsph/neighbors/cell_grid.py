@@ -89,6 +89,29 @@ class CellGrid:
             flat = flat * n + jnp.clip(place.astype(jnp.int32), 0, n - 1)
         return flat
 
+    def along(self, axes: tuple[int, ...]) -> CellGrid:
+        """The same cells, numbered along the axes in that order, the first one slowest; points have
+        their coordinates in it."""
+        lower, upper, periodic, shape = (
+            tuple(of[k] for k in axes)
+            for of in (self.box.lower, self.box.upper, self.box.periodic, self.shape)
+        )
+        return CellGrid(Box(lower, upper, periodic), shape, self.reach)
+
+    def depth(self, position: Float[Array, "points dim"]) -> int:
+        """The most points that lie, in the order of cells, between one and the first or the last in
+        the cells around all that follow or go before it (outside jit)."""
+        layer = math.prod(self.shape[1:])
+        row = layer // self.shape[1]
+        # of its own layer all where rows are met round the end, else a few rows
+        own = layer if self.box.periodic[1] else min(layer, (self.reach + 1) * row)
+        stretch = min(self.reach * layer + own, self.cells)
+        count = np.bincount(np.asarray(self.locate(position)), minlength=self.cells)
+        if self.box.periodic[0]:
+            count = np.concatenate([count, count[: stretch - 1]])
+        before = np.concatenate([[0], np.cumsum(count)])
+        return int(np.max(before[stretch:] - before[:-stretch]))
+
     def occupancy(self, position: Float[Array, "points dim"]) -> int:
         """The largest number of points in one cell (outside jit, to choose a capacity)."""
         return int(np.bincount(np.asarray(self.locate(position)), minlength=self.cells).max())

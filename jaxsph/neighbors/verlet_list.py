@@ -10,10 +10,11 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ..devices import Devices
 from ..domain import Box
+from ..exchange import Exchange, least
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 from .rows_of_devices import RowsOfDevices
@@ -28,34 +29,61 @@ class VerletList(eqx.Module):
     Row k of `index` lists the sorted places of the neighbours of the particle at sorted place k;
     free slots point to k itself, whose separation is zero and so adds nothing to a pair sum.
 
-    Where `devices` share the rows, there are rows up to equal shares, and entries count from the
-    first row of the device that holds them, and round the end.
+    Where devices share the rows, there are rows up to equal shares, and entries are places in the
+    window of the device that holds them, as `exchange` has it.
+
+    `order` has the number of the particle at each sorted place, `inverse` the converse; none where
+    the particles lie `in_place`.
     """
 
     index: Int[Array, "particles capacity"]
     order: Int[Array, " particles"]
-    inverse: Int[Array, " particles"]
+    inverse: Int[Array, " particles"] | None
     reference: Float[Array, "particles dim"]
     largest_count: Int[Array, ""]
     cell_overflow: Int[Array, ""]
-    devices: Devices | None = eqx.field(static=True, default=None)
+    exchange: Exchange | None = eqx.field(static=True, default=None)
 
     def sort(self, field: Array) -> Array:
         """A per-particle field in the list's cell-sorted order."""
-        if self.devices is not None:
-            return self.devices.take(field, self.order)
+        if self.inverse is None:
+            return self.exchange.devices.divided(field)
+        if self.exchange is not None:
+            return self.exchange.devices.take(field, self.order)
         return field.at[self.order].get(mode="promise_in_bounds", unique_indices=True)
 
     def unsort(self, field: Array) -> Array:
         """A field in cell-sorted order back in the particles' own order."""
-        if self.devices is not None:
-            return self.devices.take(field, self.inverse)
+        if self.inverse is None:
+            return self.exchange.devices.divided(field)
+        if self.exchange is not None:
+            return self.exchange.devices.take(field, self.inverse)
         return field.at[self.inverse].get(mode="promise_in_bounds", unique_indices=True)
+
+    def in_place(self, number: Int[Array, " particles"] | None = None) -> VerletList:
+        """The same list where the particles themselves are kept in its order: fields are sorted as
+        they are. `number` are those that they had when the list was built, if not 0, 1, 2 ..."""
+        order = self.order if number is None else number[self.order]
+        return replace(self, order=order, inverse=None, reference=self.sort(self.reference))
+
+    def by_number(self, field: Array) -> Array:
+        """A field of particles that lie in place, by their numbers."""
+        devices = self.exchange.devices
+        return devices.take(field, _inverse(devices.whole(self.order)))
+
+    def first(self, marked: Bool[Array, " particles"]) -> Int[Array, ""]:
+        """The number of the first particle of those marked."""
+        if self.inverse is not None:
+            return jnp.argmax(marked)
+        return jnp.min(jnp.where(marked, self.order, len(self.order)))
 
     def largest_motion(self, box: Box, position: Array) -> tuple[Array, Array]:
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         moved = box.displacement(self.reference, lax.stop_gradient(position))
         squared = jnp.sum(moved * moved, axis=1)
+        if self.inverse is None:
+            largest = jnp.max(squared)
+            return jnp.sqrt(largest), self.first(squared == largest)
         particle = jnp.argmax(squared)
         return jnp.sqrt(squared[particle]), particle
 
@@ -63,8 +91,8 @@ class VerletList(eqx.Module):
         """The least distance [m] between two neighbours, and one of the two."""
         here = self.sort(lax.stop_gradient(position)).T
         index = self.index
-        if self.devices is not None:
-            index = RowsOfDevices(self.devices, index.shape[0]).whole(index)[: here.shape[1]]
+        if self.exchange is not None:
+            index = RowsOfDevices(self.exchange, index.shape[0]).whole(index)[: here.shape[1]]
         # axis by axis, so that no array of all pairs is made
         apart = (box.minimum_image(x[index] - x[:, None], k) for k, x in enumerate(here))
         squared = sum(along * along for along in apart)
@@ -88,6 +116,8 @@ class NeighborSearch(eqx.Module):
         skin: extra radius [m]; the list stays valid until a particle has moved half of it.
         capacity: neighbours a particle can have.
         run_capacity: particles that a run of cells can hold, as many as the search reaches over.
+        depths: for each axis the particles that can be next to a device's own where cells are
+            numbered along that axis first; none if that is not known.
         devices: that share the rows of the list, if several do.
     """
 
@@ -96,6 +126,7 @@ class NeighborSearch(eqx.Module):
     skin: float = eqx.field(static=True)
     capacity: int = eqx.field(static=True)
     run_capacity: int = eqx.field(static=True)
+    depths: tuple[int, ...] = eqx.field(static=True, default=())
     devices: Devices | None = eqx.field(static=True, default=None)
 
     @classmethod
@@ -123,7 +154,9 @@ class NeighborSearch(eqx.Module):
         largest = int(_most_neighbors(trial, position))
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
-        return cls(grid, support, skin, capacity, run_capacity)
+        longways = (_along(grid, axis) for axis in range(box.dim))
+        depths = tuple(_rounded(margin * g.depth(position[:, columns])) for g, columns in longways)
+        return cls(grid, support, skin, capacity, run_capacity, depths)
 
     @property
     def box(self) -> Box:
@@ -135,7 +168,14 @@ class NeighborSearch(eqx.Module):
             self,
             capacity=math.ceil(1.2 * self.capacity),
             run_capacity=math.ceil(1.2 * self.run_capacity),
+            depths=tuple(math.ceil(1.2 * depth) for depth in self.depths),
         )
+
+    def exchange(self, particles: int) -> Exchange:
+        """How its devices exchange what they know of so many particles."""
+        # the last device's run may be short by as many rows as there are devices
+        depth = min(self.depths, default=particles) + self.devices.count
+        return least(self.devices, particles, depth)
 
     def over(self, devices: Devices) -> NeighborSearch:
         """The same search by several devices."""
@@ -154,6 +194,23 @@ class NeighborSearch(eqx.Module):
         points = Sorted.of(self.grid, position)
         words = flags(self.grid, points, points, self.support + self.skin, self.run_capacity)
         return points, words, jnp.max(count_bits(words))
+
+
+def _along(grid: CellGrid, axis: int) -> tuple[CellGrid, np.ndarray]:
+    """The same cells numbered along one axis first, and the columns of positions in it."""
+    axes = (axis, *(k for k in range(grid.box.dim) if k != axis))
+    return grid.along(axes), np.asarray(axes)
+
+
+def _rounded(number: float) -> int:
+    """Up to two digits, so that scenes alike have programs alike."""
+    last = 10 ** max(0, math.floor(math.log10(max(1.0, number))) - 1)
+    return math.ceil(number / last) * last
+
+
+def _inverse(order: Int[Array, " particles"]) -> Int[Array, " particles"]:
+    places = jnp.arange(len(order), dtype=order.dtype)
+    return jnp.zeros_like(order).at[order].set(places, unique_indices=True)
 
 
 def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
@@ -177,11 +234,17 @@ def _built(search: NeighborSearch, position) -> VerletList:
         longest = longest_run(grid, points, points)
         places = jnp.arange(points.count, dtype=jnp.int32)
         index = pick(words, grid, points, points, *room)
+        exchange = None
     else:
-        points, radius = Sorted.of(grid, position), search.support + search.skin
+        devices, exchange = search.devices, search.exchange(position.shape[0])
+        grid, columns = _along(grid, int(np.argmin(search.depths or (0,))))
+        position = devices.whole(position)  # each device sorts all
+        points = devices.whole(Sorted.of(grid, position[:, columns]))
+        radius = search.support + search.skin
         places = jnp.arange(points.count, dtype=jnp.int32)
-        rows = RowsOfDevices.of(search.devices, points.count)
-        index, largest, longest = rows.listed(grid, points, points, radius, *room)
+        rows = RowsOfDevices.of(exchange, points.count)
+        index, largest, longest, unseen = rows.listed(grid, points, points, radius, *room)
+        longest = jnp.where(unseen, search.run_capacity + 1, longest)  # has no room either
     return VerletList(
         index=index,
         order=points.order,
@@ -189,7 +252,7 @@ def _built(search: NeighborSearch, position) -> VerletList:
         reference=position,
         largest_count=largest,
         cell_overflow=(longest > search.run_capacity).astype(jnp.int32),
-        devices=search.devices,
+        exchange=exchange,
     )
 
 

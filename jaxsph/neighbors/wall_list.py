@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..devices import Devices
 from ..domain import Box
+from ..exchange import Exchange, Gathered
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 from .rows_of_devices import RowsOfDevices
@@ -29,7 +30,7 @@ class WallPairs(eqx.Module):
     Rows 0 to W - 1 of `index` belong to the W particles listed in `near`, all others to the ghosts
     listed in `ghosts`; entries are row numbers. Each pair stands in both rows.
 
-    Where `devices` share the rows, each has first its rows of particles, then those of ghosts, and
+    Where devices share the rows, each has first its rows of particles, then those of ghosts, and
     entries are as in a `VerletList`. Rows up to equal shares have no partner: their `near` is past
     the last particle, their ghost is the last one once more.
 
@@ -42,7 +43,7 @@ class WallPairs(eqx.Module):
     index: Int[Array, "rows capacity"]
     near: Int[Array, " near"]
     ghosts: Int[Array, " ghosts"]
-    devices: Devices | None = eqx.field(static=True, default=None)
+    exchange: Exchange | None = eqx.field(static=True, default=None)
 
     @property
     def fluid_rows(self) -> tuple[int, int]:
@@ -56,36 +57,35 @@ class WallPairs(eqx.Module):
 
     @property
     def _shares(self) -> int:
-        return 1 if self.devices is None else self.devices.count
+        return 1 if self.exchange is None else self.exchange.devices.count
 
     def of_near(self, field: Array) -> Array:
         """A field of the particles, in the fluid list's sorted order, at those near walls."""
-        if self.devices is None:
+        if self.exchange is None:
             return field.at[self.near].get(mode="promise_in_bounds", unique_indices=True)
-        return self.devices.whole(field.at[self.near].get(mode="clip"))
+        return self.exchange.devices.rows_for_all(field, self.near)
 
     def spread(self, values: Array, count: int) -> Array:
         """Values of the particles near walls as a field of all `count`, zero elsewhere."""
-        everywhere = jnp.zeros((count, *values.shape[1:]), values.dtype)
-        if self.devices is None:
+        if self.exchange is None:
+            everywhere = jnp.zeros((count, *values.shape[1:]), values.dtype)
             return everywhere.at[self.near].set(values, unique_indices=True)
-        values = self.devices.whole(values)
-        return self.devices.divided(everywhere.at[self.near].set(values, mode="drop"))
+        return self.exchange.devices.rows_of_all(values, self.near, count)
 
     def table(self, near: Array, ghosts: Array) -> Array:
         """A field of all rows, of that of the particles near walls and that of the ghosts."""
-        if self.devices is None:
+        if self.exchange is None:
             return jnp.concatenate([near, ghosts])
-        return self.devices.beside(near, ghosts)
+        return self.exchange.devices.beside(near, ghosts)
 
     def only(self, held: Bool[Array, " all_ghosts"]) -> WallPairs:
         """The pairs with those ghosts alone, by their numbers."""
         particles = jnp.ones(self.near.shape, bool)
         row = self.table(particles, held[self.ghosts])
         own = jnp.arange(row.shape[0], dtype=self.index.dtype)[:, None]
-        if self.devices is None:
+        if self.exchange is None:
             return replace(self, index=jnp.where(row[self.index] & row[:, None], self.index, own))
-        rows = RowsOfDevices(self.devices, row.shape[0])
+        rows = RowsOfDevices(self.exchange, row.shape[0])
         partner = row[rows.whole(self.index)]
         own = rows.counted(own)
         return replace(self, index=jnp.where(partner & row[:, None], self.index, own))
@@ -110,6 +110,18 @@ class WallList(eqx.Module):
         """A field in cell-sorted order back in the particles' own order."""
         return self.fluid.unsort(field)
 
+    def in_place(self, number: Int[Array, " particles"] | None = None) -> WallList:
+        """The same list where the particles themselves are kept in its order."""
+        return replace(self, fluid=self.fluid.in_place(number))
+
+    def by_number(self, field: Array) -> Array:
+        """A field of particles that lie in place, by their numbers."""
+        return self.fluid.by_number(field)
+
+    def first(self, marked: Bool[Array, " particles"]) -> Int[Array, ""]:
+        """The number of the first particle of those marked."""
+        return self.fluid.first(marked)
+
     def largest_motion(self, box: Box, position: Array) -> tuple[Array, Array]:
         """The longest way [m] that a particle has gone since the list was built, and which one."""
         return self.fluid.largest_motion(box, position)
@@ -121,6 +133,14 @@ class WallList(eqx.Module):
     @property
     def reference(self) -> Float[Array, "particles dim"]:
         return self.fluid.reference
+
+    @property
+    def order(self) -> Int[Array, " particles"]:
+        return self.fluid.order
+
+    @property
+    def exchange(self) -> Exchange | None:
+        return self.fluid.exchange
 
     @property
     def overflow(self) -> Array:
@@ -218,6 +238,10 @@ class WalledSearch(eqx.Module):
     @property
     def box(self) -> Box:
         return self.fluid.box
+
+    @property
+    def devices(self) -> Devices | None:
+        return self.fluid.devices
 
     def enlarged(self) -> WalledSearch:
         """The same search with a fifth more room."""
@@ -318,8 +342,9 @@ def _built(search: WalledSearch, position) -> WallList:
     position = lax.stop_gradient(position)
     fluid = search.fluid.build(position)
     built_at = search.ghosts if search.within_reach is None else None
-    if search.fluid.devices is not None:
-        pairs, overflow = _shared_pairs(search, fluid.sort(position))
+    if search.devices is not None:
+        position = search.devices.whole(position)[fluid.order]
+        pairs, overflow = _shared_pairs(search, position)
         return WallList(fluid, pairs, overflow, built_at)
     here, ghosts, (seen, seeing), (overflow, _) = search._flag(fluid.sort(position))
     grid, near, count = search.wall_grid, here.order, here.count
@@ -333,21 +358,22 @@ def _built(search: WalledSearch, position) -> WallList:
 
 def _shared_pairs(search: WalledSearch, position) -> tuple[WallPairs, Bool[Array, ""]]:
     """Each device's rows of the pairs, and whether there is no room for all."""
-    devices, grid, count = search.fluid.devices, search.wall_grid, position.shape[0]
-    here, ghosts, overflow = search._sorted(position)
-    rows, sides = RowsOfDevices.of(devices, here.count, ghosts.count), []
+    devices, grid, count = search.devices, search.wall_grid, position.shape[0]
+    exchange = Gathered(devices)  # of a surface's particles and ghosts alone
+    here, ghosts, overflow = devices.whole(search._sorted(position))
+    rows, sides = RowsOfDevices.of(exchange, here.count, ghosts.count), []
     for points, others, room, second in (
         (here, ghosts, search.ghost_run_capacity, False),
         (ghosts, here, search.near_run_capacity, True),
     ):
-        index, most, longest = rows.listed(
+        index, most, longest, _ = rows.listed(
             grid, points, others, search.fluid.support + search.skin, room, search.capacity, second
         )
         overflow = overflow | (most > search.capacity) | (longest > room)
         sides.append(index)
     near = devices.whole(devices.filled(here.order, count))  # read in every pass
     number = devices.filled(ghosts.order, ghosts.order[-1])
-    return WallPairs(devices.beside(*sides), near, number, devices), overflow
+    return WallPairs(devices.beside(*sides), near, number, exchange), overflow
 
 
 @eqx.filter_jit  # compiled once for scenes alike
