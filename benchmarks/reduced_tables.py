@@ -217,13 +217,16 @@ def label_samples() -> str:
             str(row["modes"]),
             ", ".join(f"{name} {value:g}" for name, value in row["parameters"].items())
             + (" (outside)" if row["outside"] else ""),
-            short(row["height_error_percent"]),
-            short(row["height_error_mean_percent"]),
+            *(
+                (f"lost after {row['reached_periods']:.1f} periods", "")
+                if row["fault"]
+                else (short(row["height_error_percent"]), short(row["height_error_mean_percent"]))
+            ),
             short(row["full_process_seconds"]),
             short(row["reduced_process_seconds"]),
             short(row["times_faster"]),
         )
-        for row in results("label_models")
+        for row in sorted(results("label_models"), key=lambda row: row["resolution"])
         if row["model"] == "sampled"
     ]
     return markdown(header, rows)

@@ -56,6 +56,7 @@ def kept_run(
     metadata = {"scene": scene.name, "parameters": scene.parameters}
     given = options.get("devices")
     devices = Devices(jax.local_devices()[:1] if given is None else given)
+    options |= {} if given is None else {"devices": devices}  # which may be read but once
     begun = read_trajectory(path) if done else None
     devices.meet("before a run is written")
     writer = _gone_on_with(path, begun) if done and devices.write_here else None

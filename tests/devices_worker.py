@@ -53,7 +53,7 @@ FIELDS = ("position", "velocity", "density")
 def relative(one, other):
     """Largest difference over the largest value."""
     one, other = np.asarray(one), np.asarray(other)
-    return float(np.max(np.abs(one - other)) / np.max(np.abs(one)))
+    return float(np.max(np.abs(one - other)) / (np.max(np.abs(one)) or 1.0))
 
 
 def apart(one, other):

@@ -1,5 +1,6 @@
 """What a device sees of the rows of others: places, and whether all neighbours are among them."""
 
+import dataclasses
 from dataclasses import dataclass
 
 import jax
@@ -11,6 +12,8 @@ import jaxsph
 from jaxsph.domain import Box
 from jaxsph.exchange import Gathered, Halo, least
 from jaxsph.neighbors import NeighborSearch
+
+BOX = Box((0.0, 0.0), (1.0, 1.0), (True, True))
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,28 @@ def test_halos_are_as_deep_as_neighbours_lie(periodic):
     deep = search.depths[0] + devices.count
     assert bool(jnp.all(Halo(devices, deep).seen(place, rows)[1]))
     assert not bool(jnp.all(Halo(devices, deep // 3).seen(place, rows)[1]))
+
+
+def test_halos_that_are_too_small_are_soon_all():
+    """Water that spreads can need many times the halo it began with."""
+    search = NeighborSearch.allocate(jnp.asarray([[0.5, 0.5]]), BOX, 0.1, 0.02)
+    shared = dataclasses.replace(search.over(Several(4)), depths=(60, 80))
+    assert isinstance(shared.exchange(2000), Halo)
+    for _ in range(7):
+        shared = shared.enlarged()
+    assert isinstance(shared.exchange(2000), Gathered)
+
+
+def test_one_device_does_not_compile_anew_for_other_halos():
+    random = np.random.default_rng(1)
+    side = np.arange(20) / 20 + 0.01
+    even = jnp.asarray(np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2))
+    moved = even + jnp.asarray(random.uniform(0.0, 0.02, (400, 2)))
+    one, other = (NeighborSearch.allocate(x, BOX, 0.1, 0.02) for x in (even, moved))
+    other = dataclasses.replace(other, capacity=one.capacity, run_capacity=one.run_capacity)
+    assert tuple.__ne__(one.depths, other.depths)
+    assert jax.tree.structure(one) == jax.tree.structure(other)
+    assert jax.tree.structure(one.over(Several(2))) != jax.tree.structure(other.over(Several(2)))
 
 
 @pytest.mark.run_once

@@ -155,20 +155,21 @@ class NeighborSearch(eqx.Module):
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
         longways = (_along(grid, axis) for axis in range(box.dim))
-        depths = tuple(_rounded(margin * g.depth(position[:, columns])) for g, columns in longways)
-        return cls(grid, support, skin, capacity, run_capacity, depths)
+        depths = (_rounded(margin * g.depth(position[:, columns])) for g, columns in longways)
+        return cls(grid, support, skin, capacity, run_capacity, _Unread(depths))
 
     @property
     def box(self) -> Box:
         return self.grid.box
 
     def enlarged(self) -> NeighborSearch:
-        """The same search with a fifth more room."""
+        """The same search with a fifth more room, and halos twice as deep: in a few times they
+        are no less than all."""
         return replace(
             self,
             capacity=math.ceil(1.2 * self.capacity),
             run_capacity=math.ceil(1.2 * self.run_capacity),
-            depths=tuple(math.ceil(1.2 * depth) for depth in self.depths),
+            depths=self.depths if self.devices is None else tuple(2 * d for d in self.depths),
         )
 
     def exchange(self, particles: int) -> Exchange:
@@ -179,7 +180,7 @@ class NeighborSearch(eqx.Module):
 
     def over(self, devices: Devices) -> NeighborSearch:
         """The same search by several devices."""
-        return replace(self, devices=devices)
+        return replace(self, devices=devices, depths=tuple(self.depths))
 
     def largest_motion(self, neighbors: VerletList, position: Array) -> tuple[Array, Array]:
         """The longest way [m] that a particle has gone since the list was built, and which one."""
@@ -194,6 +195,16 @@ class NeighborSearch(eqx.Module):
         points = Sorted.of(self.grid, position)
         words = flags(self.grid, points, points, self.support + self.skin, self.run_capacity)
         return points, words, jnp.max(count_bits(words))
+
+
+class _Unread(tuple):
+    """Numbers that a single device does not read: programs that differ in them are the same."""
+
+    def __eq__(self, other):
+        return isinstance(other, tuple)
+
+    def __hash__(self):
+        return 0
 
 
 def _along(grid: CellGrid, axis: int) -> tuple[CellGrid, np.ndarray]:

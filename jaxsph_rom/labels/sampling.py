@@ -29,12 +29,16 @@ from .products import products
 from .sampled_system import SampledSystem
 
 _RATES = 400  # states of all runs together at which rates are taken
-_SEEN = 24  # states at which samples are asked whom they see
+_SEEN = 24  # of all runs at which samples are asked whom they see
+_LEAST = 5  # of either in a run
+_ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
 _SLACK = 0.1  # times dx: of the list's skin over what the runs need
 
 
 def check_sampling(sampling: Sampling, scene: Scene) -> None:
-    """Raise a ValueError if there are not so many particles, or walls move."""
+    """Raise a ValueError if it is none, there are not so many particles, or walls move."""
+    if not isinstance(sampling, Sampling):
+        raise ValueError(f"sampling: a Sampling as QDEIM(16), got {sampling!r}.")
     check_count(sampling.samples, len(scene.state.position))
     if scene.walls is not None and scene.walls.bodies is not None:
         raise ValueError("sampling: walls that move have no samples yet; learn tensors instead.")
@@ -67,15 +71,18 @@ def sample(
         interval: from snapshot to snapshot [s].
 
     Raises:
-        ValueError: as `Sampling.choose` and `recover`.
+        ValueError: as `Sampling.choose` and `recover`, where particles bunch at states of the
+            reduced model, or if they go so far that a periodic box is too small for a fixed list.
     """
     functional, size, (count, dim) = inputs.functional, runs[0].coordinates.shape[1], labels.shape
     recovery = jnp.asarray(recover(runs, inputs, interval), labels.dtype)
     whole = _Manifold(*jax.tree.map(jnp.asarray, (motion, density, labels)), recovery, inputs)
-    found = [
-        _rates_at(whole, model, *_some(run, interval, _RATES // len(runs)))
-        for model, run in zip(models, runs, strict=True)
-    ]
+    found, roomy = [], []
+    for model, run in zip(models, runs, strict=True):
+        states = _some(run, interval, _RATES // len(runs))
+        rates, model = _with_room(whole, model, *states)
+        found.append(rates)
+        roomy.append(model)
     scale, modes = (_by_particle(a, count, dim) for a in (motion.scale, motion.modes))
     ones = np.ones(2 * dim)
     rates = np.moveaxis(scale * np.concatenate([np.asarray(f) for f in found]), 0, -1)
@@ -83,7 +90,7 @@ def sample(
     points, gather = sampling.choose(basis, rate_modes(rates, ones, functional.fluid))
     seen = [
         _seen_at(whole, model, jnp.asarray(points), *_some(run, interval, _SEEN // len(runs)))
-        for model, run in zip(models, runs, strict=True)
+        for model, run in zip(roomy, runs, strict=True)
     ]
     particles, ghosts, skin = (
         np.concatenate([np.asarray(getattr(each, name)) for each in seen]) for name in _Seen._fields
@@ -118,11 +125,11 @@ def _by_particle(numbers, count: int, dim: int):
 
 
 def _some(run: LabelRun, interval: float, wanted: int):
-    """Times, coordinates and theta of some of a run's snapshots."""
-    each = max(1, len(run.coordinates) // max(wanted, 1))
-    times = interval * np.arange(len(run.coordinates))[::each]
-    dtype = run.coordinates.dtype
-    return tuple(jnp.asarray(a, dtype) for a in (times, run.coordinates[::each], run.values))
+    """Times, coordinates and theta of some of a run's snapshots, from the first to the last."""
+    count, dtype = len(run.coordinates), run.coordinates.dtype
+    chosen = np.linspace(0, count - 1, min(count, max(wanted, _LEAST))).round().astype(int)
+    parts = (interval * chosen, run.coordinates[chosen], run.values)
+    return tuple(jnp.asarray(a, dtype) for a in parts)
 
 
 def _around(
@@ -159,19 +166,35 @@ class _Manifold(eqx.Module):
         return ParticleState(self.labels + way, velocity, self.density.numbers(others[more:]))
 
 
+def _with_room(whole, model: FullModel, *states):
+    """Rates of a model whose lists have room at all states, and that model."""
+    for _ in range(_ENLARGEMENTS):
+        found, overflow = _rates_at(whole, model, *states)
+        if not overflow:
+            return found, model
+        model = model.enlarged()
+    raise ValueError(
+        "modes: at states of the reduced model particles bunch beyond all room of the neighbour "
+        "list; take more recovered modes, or other runs."
+    )
+
+
 @eqx.filter_jit
 @full_precision
 def _rates_at(
     whole, model, times, coordinates, values
-) -> Float[Array, "states particles fields"]:
-    """(dx/dt - u, du/dt) of all particles."""
+) -> tuple[Float[Array, "states particles fields"], Bool[Array, ""]]:
+    """(dx/dt - u, du/dt) of all particles, and whether a list had no room."""
 
     def at(moment):
         state = whole.state(*moment, values)
-        found = model.functional(moment[0], state, model.prepare(state))
-        return jnp.concatenate([found.position - state.velocity, found.velocity], axis=1)
+        neighbors = model.prepare(state)
+        found = model.functional(moment[0], state, neighbors)
+        rates = jnp.concatenate([found.position - state.velocity, found.velocity], axis=1)
+        return rates, neighbors.overflow
 
-    return lax.map(at, (times, coordinates))
+    rates, overflow = lax.map(at, (times, coordinates))
+    return rates, jnp.any(overflow)
 
 
 class _Seen(NamedTuple):

@@ -22,7 +22,7 @@ from .reduced_flow import ReducedFlow
 from .times import EvenTimes, Times
 
 _BATCH = 500  # members of a CPU; what a step touches then stays in cache
-_WIDE_BATCH = 100_000  # of a GPU, which is busy with many
+_WIDE_BATCH = 10_000  # of a GPU, which is busy with many
 
 
 class Sweep(NamedTuple):
@@ -62,7 +62,7 @@ def sweep(
         values: theta of each member; a viscosity [m^2/s], say.
         schedule: of all members.
         batch: members that a device runs at a time; 500 on a CPU, whose cache holds them, and
-            100,000 on a GPU if it is not given.
+            10,000 on a GPU if it is not given.
         progress: is called with the number of members done since its last call.
 
     Raises:
