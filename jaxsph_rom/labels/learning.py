@@ -97,7 +97,7 @@ def learn(runs: Sequence[LabelRun], inputs: Inputs, interval: float) -> Learnt:
     """
     known, size = _known(runs, inputs, interval)
     rates = np.concatenate([_rates(np.asarray(r.coordinates, float), interval) for r in runs])
-    recovery = recover(runs, inputs, interval)
+    recovery = _recovery(runs, known, size)
     roll_outs = _RollOuts.of(runs, interval)
     tried = [_fitted(known / size, rates, ridge) for ridge in _RIDGES]
     dtype = runs[0].coordinates.dtype
@@ -134,7 +134,10 @@ def recover(
     Raises:
         ValueError: for fewer than eleven snapshots.
     """
-    known, size = _known(runs, inputs, interval)
+    return _recovery(runs, *_known(runs, inputs, interval))
+
+
+def _recovery(runs, known, size):
     others = np.concatenate([np.asarray(r.others[_EDGE:-_EDGE], float) for r in runs])
     return _fitted(known / size, others, _RECOVERY_RIDGE) / size
 

@@ -60,11 +60,21 @@ class SampledSystem(LabelSystem):
         """da/dt."""
         others, more = self.recovered(time, coordinates, values), self.motion.size - self.size
         b = jnp.concatenate([coordinates, others[:more]])
-        moved = self.motion.numbers(b)
-        way, velocity = (part.reshape(self.labels.shape) for part in jnp.split(moved, 2))
-        state = ParticleState(self.labels + way, velocity, self.density.numbers(others[more:]))
+        state = state_at(self.motion, self.density, self.labels, b, others[more:])
         functional = self.inputs.coefficients.applied(self.inputs.functional, values)
         found = functional(time, state, self.neighbors)
-        rates = jnp.concatenate([found.position - velocity, found.velocity], axis=1)
+        rates = jnp.concatenate([found.position - state.velocity, found.velocity], axis=1)
         seen = rates[: self.gather.shape[1]]
         return self.carried @ b + self.carried_centre + jnp.einsum("mpf,pf->m", self.gather, seen)
+
+
+def state_at(
+    motion: LabelBasis,
+    density: LabelBasis,
+    labels: Float[Array, "particles dim"],
+    of_motion: Float[Array, " modes"],
+    of_density: Float[Array, " modes"],
+) -> ParticleState:
+    """Particles at coordinates of all modes of motion and of density."""
+    way, velocity = (part.reshape(labels.shape) for part in jnp.split(motion.numbers(of_motion), 2))
+    return ParticleState(labels + way, velocity, density.numbers(of_density))

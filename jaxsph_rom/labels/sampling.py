@@ -26,7 +26,7 @@ from .inputs import Inputs
 from .label_basis import LabelBasis
 from .learning import LabelRun, recover
 from .products import products
-from .sampled_system import SampledSystem
+from .sampled_system import SampledSystem, state_at
 
 _RATES = 400  # states of all runs together at which rates are taken
 _SEEN = 24  # of all runs at which samples are asked whom they see
@@ -161,9 +161,8 @@ class _Manifold(eqx.Module):
     def state(self, time, coordinates, values) -> ParticleState:
         others = self.recovery @ products(coordinates, self.inputs(time, values))
         more = self.motion.size - coordinates.shape[0]
-        moved = self.motion.numbers(jnp.concatenate([coordinates, others[:more]]))
-        way, velocity = (part.reshape(self.labels.shape) for part in jnp.split(moved, 2))
-        return ParticleState(self.labels + way, velocity, self.density.numbers(others[more:]))
+        b = jnp.concatenate([coordinates, others[:more]])
+        return state_at(self.motion, self.density, self.labels, b, others[more:])
 
 
 def _with_room(whole, model: FullModel, *states):
