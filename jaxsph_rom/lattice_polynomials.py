@@ -79,7 +79,8 @@ class LatticePolynomials(ModeInterpolation):
             for k, place in enumerate(stencil):
                 row = row * self.shape[k] + numbers[k][place]
                 weight = weight * weights[k][place]
-            found = found + weight[:, None] * self.values[row]
+            there = self.values.at[row].get(mode="promise_in_bounds", wrap_negative_indices=False)
+            found = found + weight[:, None] * there
         return found
 
     def _along(self, k: int, x: Float[Array, " particles"]):

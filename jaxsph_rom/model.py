@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
@@ -189,7 +188,7 @@ class ReducedModel(Model):
 
         def carried():
             fields = self.interpolation.combined(self.basis.combination(coordinates)[0])
-            return jax.jvp(fields, (position,), (rates.position,))[1]
+            return jnp.sum(fields.gradient(position) * rates.position[:, None], axis=2)
 
         found = self.advection.remaining(seen, particles.density, carried)
         return found.reshape(-1), rates.position
@@ -203,14 +202,9 @@ class ReducedModel(Model):
         stacked = lax.optimization_barrier((centre + resolved).reshape(-1))
 
         def full_rates(stacked):
-            return self.stacked_rates(
-                time, stacked, state.position, auxiliary, state.coordinates
-            )
+            return self.stacked_rates(time, stacked, state.position, auxiliary, state.coordinates)
 
-        rates, transport = full_rates(stacked)
-        coordinates = self.projection.reduce(
-            inverse, lambda w: full_rates(w)[0], stacked, rates
-        )
+        coordinates, transport = self.projection.reduce(inverse, full_rates, stacked)
         return ReducedState(coordinates, transport)
 
     def finish(self, state):

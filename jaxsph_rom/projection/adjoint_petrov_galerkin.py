@@ -12,7 +12,8 @@ class AdjointPetrovGalerkin(Projection):
     """d(w^)/dt = Phi^+ [f-bar + tau J Pi' f-bar] (paper, eq. APG; Parish et al. 2020).
 
     J is the derivative of f-bar with respect to (rho, u) at frozen positions (particle volumes
-    m / rho included); its action is `jax.jvp`, where the paper takes a finite difference.
+    m / rho included); its action is that of `jax.jvp`, by `jax.linearize`, which passes over the
+    pairs once for f-bar and for what J needs of it. The paper takes a finite difference.
 
     Args:
         tau: memory length [s].
@@ -24,7 +25,7 @@ class AdjointPetrovGalerkin(Projection):
     def name(self):
         return "apg"
 
-    def reduce(self, inverse, functional, state, rates):
-        unresolved = inverse.complement(rates)
-        memory = jax.jvp(functional, (state,), (unresolved,))[1]
-        return inverse(rates + self.tau * memory)
+    def reduce(self, inverse, functional, state):
+        rates, jacobian, beside = jax.linearize(functional, state, has_aux=True)
+        memory = jacobian(inverse.complement(rates))
+        return inverse(rates + self.tau * memory), beside

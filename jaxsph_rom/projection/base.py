@@ -54,15 +54,13 @@ class Projection(eqx.Module):
     def reduce(
         self,
         inverse: PseudoInverse,
-        functional: Callable[[Float[Array, " states"]], Float[Array, " states"]],
+        functional: Callable[[Float[Array, " states"]], tuple[Float[Array, " states"], Array]],
         state: Float[Array, " states"],
-        rates: Float[Array, " states"],
-    ) -> Float[Array, " modes"]:
-        """d(coordinates)/dt.
+    ) -> tuple[Float[Array, " modes"], Array]:
+        """d(coordinates)/dt, and what the functional finds beside its rates.
 
         Args:
             inverse: pseudo-inverse of the basis at the particles.
-            functional: f-bar of the stacked state at frozen positions.
+            functional: f-bar of the stacked state at frozen positions, and something beside it.
             state: where to evaluate.
-            rates: f-bar(state), computed already.
         """

@@ -10,5 +10,6 @@ class Galerkin(Projection):
     def name(self):
         return "galerkin"
 
-    def reduce(self, inverse, functional, state, rates):
-        return inverse(rates)
+    def reduce(self, inverse, functional, state):
+        rates, beside = functional(state)
+        return inverse(rates), beside

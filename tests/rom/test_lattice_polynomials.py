@@ -86,6 +86,9 @@ def test_derivatives_in_position():
     tangent = jax.jvp(made, (places,), (step,))[1]
     central = (made(places + 1e-6 * step) - made(places - 1e-6 * step)) / 2e-6
     np.testing.assert_allclose(tangent, central, atol=1e-7)
+    for fitted in (made, LocalSplines.fit(points, np.sin(2.0 * np.pi * points), PERIODIC)):
+        along_each = jax.vmap(jax.jacfwd(lambda x, fitted=fitted: fitted(x[None])[0]))(places)
+        np.testing.assert_allclose(fitted.gradient(places), along_each, atol=1e-12)
 
 
 def test_what_is_no_lattice_is_refused():
