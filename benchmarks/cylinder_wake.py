@@ -6,9 +6,9 @@ Forces are means between snapshots of every stage of every step. Steady flows (R
 its deviation over the last quarter of the run, and the distance from the cylinder's back to where
 the mean velocity on the centre line turns. Shedding ones: over the second half, a sine with its
 frequency free is fitted to lift; the part of lift that it leaves is told. Literature is of a single
-cylinder in an unbounded stream, the scene's is one of a row, D / width of the stream: two widths
-show what that makes. Every finished run's row is in the JSON file at once; the same command goes
-on where it was cut short.
+cylinder in an unbounded stream, the scene's is one of a row, D / width of the stream, and the
+stream is uniform a finite way ahead of it: two widths and two ways show what that makes. Every
+finished run's row is in the JSON file at once; the same command goes on where it was cut short.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .open_flows import last_turn, mean_along, ran
 from .table import Table, command
 from .wake_runs import harmonic
 
-KEY = ("reynolds", "resolution", "width", "h_over_dx", "mach", "end_time")
+KEY = ("reynolds", "resolution", "width", "upstream", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # of a single cylinder
     20: {"drag": (2.00, 2.05), "wake_length": (0.90, 0.94)},
     40: {"drag": (1.50, 1.55), "wake_length": (2.1, 2.3)},
@@ -52,6 +52,8 @@ def _arguments(add) -> None:
         help="particles a diameter (default: 10)")  # fmt: skip
     add("--widths", type=positive_float, nargs="+", default=[10.0], metavar="W",
         help="from cylinder to cylinder [m] (default: 10)")  # fmt: skip
+    add("--upstream", type=positive_float, nargs="+", default=[5.0], metavar="X",
+        help="of stream ahead of the cylinder [m] (default: 5)")  # fmt: skip
     add("--h-over-dx", type=positive_float, default=1.5, metavar="X", help="default: 1.5")
     add("--mach", type=positive_float, default=0.1, metavar="M", help="default: 0.1")
     add("--t-end", type=positive_float, metavar="T",
@@ -61,11 +63,12 @@ def _arguments(add) -> None:
 def _run(options) -> bool:
     kept = Table(options.json, KEY, beside=lambda rows: {"literature": LITERATURE})
     cases = []
-    for n, width, re in product(options.resolutions, options.widths, options.reynolds):
+    domains = product(options.resolutions, options.widths, options.upstream)
+    for (n, width, ahead), re in product(domains, options.reynolds):
         end = options.t_end or END_TIME[re > SHEDS]
         if re > SHEDS and end < SHORTEST:
             raise ValueError(f"--t-end: at least {SHORTEST:g} s, or lift cannot be seen to swing.")
-        values = (re, n, width, options.h_over_dx, options.mach, end)
+        values = (re, n, width, ahead, options.h_over_dx, options.mach, end)
         cases.append(dict(zip(KEY, values, strict=True)))
     for case in kept.left(cases):
         kept.add(case | run(case))
@@ -114,10 +117,10 @@ def wake_length(scene, trajectory, late) -> float:
 
 
 def _table(rows) -> str:
-    head = ("Re", "a diameter", "width", "drag", "lift", "Strouhal", "wake", "seconds")
+    head = ("Re", "a diameter", "width", "ahead", "drag", "lift", "Strouhal", "wake", "seconds")
     names = ("drag", "lift_amplitude", "strouhal", "wake_length", "seconds")
     found = [
-        (number(r["reynolds"]), str(r["resolution"]), number(r["width"]),
+        (number(r["reynolds"]), str(r["resolution"]), number(r["width"]), number(r["upstream"]),
          *(number(r.get(name), 4) for name in names)) for r in rows
     ]  # fmt: skip
     return format_rows(head, found)

@@ -7,13 +7,14 @@ from .table_text import markdown, results, short
 
 def cylinder_wake() -> str:
     """Coefficients by Reynolds number, resolution and width of the stream."""
-    header = ("Re", "particles a diameter", "cylinders apart [D]", "drag", "lift amplitude",
-              "Strouhal", "wake [D]", "steps", "run [s]")  # fmt: skip
+    header = ("Re", "particles a diameter", "cylinders apart [D]", "stream ahead [D]",
+              "drag", "lift amplitude", "Strouhal", "wake [D]", "steps", "run [s]")  # fmt: skip
     rows = [
         (
             short(row["reynolds"], 3),
             str(row["resolution"]),
             f"{row['width']:g}",
+            f"{row['upstream']:g}",
             short(row["drag"], 3),
             *(
                 short(row[name], 3) if name in row else ""
@@ -24,7 +25,7 @@ def cylinder_wake() -> str:
         )
         for row in sorted(
             results("cylinder_wake"),
-            key=lambda row: (row["reynolds"], row["width"], row["resolution"]),
+            key=lambda row: (row["reynolds"], row["upstream"], row["width"], row["resolution"]),
         )
         if row["fault"] is None
     ]

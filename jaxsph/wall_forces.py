@@ -22,7 +22,7 @@ from .wall_surface import Loads, WallSurface
 from .walls.parts import WHOLE
 from .walls.surface import surface
 from .walls.turning import Turning
-from .walls.walls import distances
+from .walls.walls import distances, ghosts_in
 
 _ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
 
@@ -74,7 +74,7 @@ class WallForces(eqx.Module):
         if walls is None:
             return None
         ghosts = np.asarray(walls.position)
-        own = [distances(part.region, ghosts) < 0.0 for part in walls.parts]
+        own = ghosts_in([part.region for part in walls.parts], ghosts, space.spacing)
         held = [np.ones(len(ghosts), bool), *own]
         points, areas, behind = surface(walls.fluid_region, space)
         _, nearest = cKDTree(ghosts).query(behind)

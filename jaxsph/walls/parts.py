@@ -20,7 +20,8 @@ class WallPart:
 
     Args:
         name: of the part.
-        region: that holds its ghosts at t = 0.
+        region: that holds its ghosts at t = 0, on its surface or in it; one on the surfaces of
+            several parts belongs to the first of them.
         reference_length: L [m]; the longest side of a box around its ghosts if none is given.
         reference_speed: U [m/s]; the fluid's if none is given.
 

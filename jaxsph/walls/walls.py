@@ -25,6 +25,7 @@ from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
+_ON_SURFACE = 1e-3  # times dx: a ghost that near a part's surface lies on it
 
 
 @final
@@ -125,8 +126,8 @@ class Walls(eqx.Module):
         refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
         skin = ghosts + (1.0 - _HAIR) * depth * normal
         velocity = np.zeros_like(ghosts)
-        for lid in moving:
-            held = _in_blocks(_distance, lid.part, ghosts) < 0.0
+        of_lids = ghosts_in([lid.part for lid in moving], ghosts, space.spacing)
+        for lid, held in zip(moving, of_lids, strict=True):
             if not held.any():
                 raise ValueError(
                     f"moving wall: no ghost lies in {lid.part}; a lid needs a wall to sit in. Let "
@@ -142,7 +143,7 @@ class Walls(eqx.Module):
                 )
         here = [jnp.asarray(a) for a in (ghosts, normal, velocity)]
         if not moved:
-            _check_parts(parts, ghosts)
+            _check_parts(parts, ghosts, space.spacing)
             return cls(*here, fluid_region, None, tuple(parts))
         position, normal, number = _body_ghosts(fluid_region, moved, space, thickness)
         number = np.concatenate([np.full(len(ghosts), len(moved)), number])
@@ -157,7 +158,7 @@ class Walls(eqx.Module):
         owner = jnp.asarray(np.where(number < len(bodies), number, len(bodies)), jnp.int32)
         start = Bodies.at_start(bodies, owner, space.box, free)
         here[2] = here[2] + start.of_ghosts(start.velocity)
-        _check_parts(parts, np.asarray(here[0]))
+        _check_parts(parts, np.asarray(here[0]), space.spacing)
         return cls(*here, fluid_region, start, tuple(parts))
 
     @property
@@ -237,13 +238,28 @@ class Walls(eqx.Module):
         return position
 
 
-def _check_parts(parts: Sequence[WallPart], ghosts: np.ndarray) -> None:
+def ghosts_in(
+    regions: Sequence[Region], ghosts: Float[np.ndarray, "ghosts dim"], spacing: float
+) -> list[Bool[np.ndarray, " ghosts"]]:
+    """Which ghosts lie in each of some regions, those on its surface among them, as there are where
+    a wall crosses places of the lattice; one on the surfaces of several is in the first of them."""
+    found, taken = [], np.zeros(len(ghosts), bool)
+    for region in regions:
+        distance = distances(region, ghosts)
+        on_surface = (np.abs(distance) < _ON_SURFACE * spacing) & ~taken
+        taken |= on_surface
+        found.append((distance <= -_ON_SURFACE * spacing) | on_surface)
+    return found
+
+
+def _check_parts(parts: Sequence[WallPart], ghosts: np.ndarray, spacing: float) -> None:
     """A ValueError for two parts of one name, or one without a ghost."""
     names = [part.name for part in parts]
-    for part in parts:
+    held = ghosts_in([part.region for part in parts], ghosts, spacing)
+    for part, own in zip(parts, held, strict=True):
         if names.count(part.name) > 1:
             raise ValueError(f"parts: two have the name {part.name!r}; give each its own.")
-        if not (distances(part.region, ghosts) < 0.0).any():
+        if not own.any():
             raise ValueError(
                 f"part {part.name}: no ghost lies in {part.region}; let it cover some of the wall, "
                 "several spacings thick, beyond the fluid."

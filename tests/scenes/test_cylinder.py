@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsph import run_scene
+from jaxsph import WallForces, run_scene
 from jaxsph.scenes import cylinder
 from jaxsph.scenes.record import scene_from_record
 
@@ -51,6 +51,20 @@ def test_wake_is_kicked_once_behind_the_cylinder():
 def test_bad_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         cylinder(**settings)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_ghost_on_its_surface_is_the_cylinders_too(dtype):
+    """As two are with seven to a diameter, in the middle of its front and of its back."""
+    scene = cylinder(7, 40.0, upstream=2.0, downstream=2.0, width=3.0, dtype=dtype)
+    measure, ghosts = WallForces.of(scene), np.float64(scene.walls.position)
+    away = np.hypot(ghosts[:, 0] - 2.0, ghosts[:, 1])
+    assert np.isclose(away, 0.5, atol=1e-6).any()
+    assert measure.names == ("walls", "cylinder")
+    assert measure.held.all() and measure.parts.all()
+    forces, _ = measure(scene.model(), jnp.zeros((), dtype), scene.state)
+    np.testing.assert_allclose(forces["cylinder"], forces["walls"], rtol=1e-6)
+    assert forces["cylinder"][0] > 1.0  # N
 
 
 def test_single_precision_goes_through():

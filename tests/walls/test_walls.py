@@ -11,7 +11,7 @@ from jaxsph import BallRegion, Box, BoxRegion, MovingWall, SignedDistance, Space
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.kernels import QuinticSpline, WendlandC2
 from jaxsph.scenes import couette, lid_driven_cavity
-from jaxsph.walls.walls import fill
+from jaxsph.walls.walls import fill, ghosts_in
 
 SIDE = 20
 DX = 1.0 / SIDE
@@ -200,6 +200,31 @@ def test_a_body_across_a_periodic_face_is_one_in_the_middle():
         return points[np.lexsort(np.round(points, 6).T)]
 
     np.testing.assert_allclose(ordered(moved), ordered(np.asarray(amid.position)), atol=1e-9)
+
+
+def test_ghosts_on_a_walls_surface_slide_with_it():
+    """Where a wall runs through places of the lattice, as one a half spacing lower does."""
+    top = 1.0 - 0.5 * DX
+    along = MovingWall(
+        BoxRegion((-1.0, top), (2.0, 2.0)), lambda x: jnp.ones_like(x) * jnp.asarray([[1.0, 0.0]])
+    )
+    walls = Walls.around(BoxRegion((0.0, 0.0), (1.0, top)), space(), (along,))
+    on_top = np.isclose(walls.position[:, 1], top)
+    assert on_top.any()
+    np.testing.assert_array_equal(walls.velocity[:, 0], walls.position[:, 1] > top - 0.1 * DX)
+
+
+def test_a_ghost_between_two_parts_belongs_to_one_of_them():
+    ghosts = np.stack([np.linspace(-1.0, 1.0, 5), np.full(5, -0.5)], axis=1)
+    left, right = BoxRegion((-2.0, -1.0), (0.0, 0.0)), BoxRegion((0.0, -1.0), (2.0, 0.0))
+    of_left, of_right = ghosts_in((left, right), ghosts, spacing=0.5)
+    np.testing.assert_array_equal(of_left, [True, True, True, False, False])
+    np.testing.assert_array_equal(of_right, ~of_left)
+    whole = BoxRegion((-2.0, -1.0), (2.0, 0.0))  # that overlaps: each has what it covers
+    for others in ((left, whole), (whole, left)):
+        held = dict(zip(others, ghosts_in(others, ghosts, 0.5), strict=True))
+        assert held[whole].all() and held[left].sum() == 3
+    assert ghosts_in((), ghosts, 0.5) == []
 
 
 # ------------------------------------------------------------------ what is refused
