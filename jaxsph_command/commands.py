@@ -26,6 +26,10 @@ COMMANDS = {
     "jaxsph-rom": {
         "run": ("train, predict, compare with the full model", "jaxsph_rom.cli.run"),
         "train": ("make a reduced model on reference points, as a file", "jaxsph_rom.cli.train"),
+        "labels": (
+            "make a reduced model of a free surface, on labels, as a file",
+            "jaxsph_rom.cli.labels",
+        ),
         "predict": (
             "run the file of a reduced model at any parameters",
             "jaxsph_rom.cli.predict",

@@ -9,6 +9,11 @@ from jaxtyping import Float
 _UNEVEN = 1e-6  # of an interval
 
 
+def least_snapshots(order: int = 4) -> int:
+    """As many as the filter needs: what scipy continues the signal by, and one."""
+    return 3 * (order + 1) + 1
+
+
 def low_pass(
     snapshots: Float[np.ndarray, "points fields times"],
     time: Float[np.ndarray, " times"],
@@ -40,7 +45,7 @@ def low_pass(
     time = np.asarray(time, float)
     if order < 1:
         raise ValueError(f"order: a filter needs at least 1, got {order}.")
-    needed = 3 * (order + 1) + 1  # what scipy continues the signal by, and one
+    needed = least_snapshots(order)
     if len(time) < needed:
         raise ValueError(
             f"snapshots: {len(time)}, but a filter of order {order} needs {needed}; record more "

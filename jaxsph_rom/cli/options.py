@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from jaxsph.cli.scene_functions import made, unpacked
 from jaxsph.cli.scene_options import add_scene_options, scene_settings
 from jaxsph.progress import progress_bar
 from jaxsph.scenes import Scene
+from jaxsph.schedule import Schedule
 from jaxsph_command.errors import meant
 
 from ..basis import Energy, Euclidean
@@ -27,6 +30,7 @@ from ..study import PLANS, Plan, quiet
 
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 CLOSURES = ("none", "linear")
+MOST_BYTES = 4 * 2**30  # of all coordinates of a prediction
 FORMULATIONS = ("compressible", "solenoidal")
 
 
@@ -170,6 +174,34 @@ def said(parameters: Mapping[str, float]) -> str:
 def distinct(values) -> tuple[float, ...]:
     """Values without repetitions, in the order given."""
     return tuple(dict.fromkeys(values))
+
+
+def wanted_points(options, names: Sequence[str]) -> np.ndarray:
+    """A row of a model's parameters a member."""
+    given = by_name([*(("reynolds", v) for v in options.reynolds or ()), *(options.at or ())])
+    if set(given) != set(names):
+        wanted = " ".join(f"{name}=..." for name in names)
+        raise ValueError(f"--at: give a value of each parameter of the model: --at {wanted}")
+    count = math.prod(len(values) for values in given.values())
+    if count > MOST_NUMBERS:
+        raise ValueError(f"--at: {count} combinations; give at most {MOST_NUMBERS} a call.")
+    return np.array(list(product(*(given[name] for name in names))))
+
+
+def wanted_times(options, schedule: Schedule, modes: int) -> np.ndarray | None:
+    """Whole snapshot intervals to the end that is asked for."""
+    if options.t_end is None:
+        return None
+    count = max(1, round(options.t_end / schedule.interval))
+    nearest = count * schedule.interval
+    if abs(nearest - options.t_end) > 1e-6 * nearest:
+        raise ValueError(
+            f"--t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
+            f"{schedule.interval:g} s; the nearest is {nearest:g} s."
+        )
+    if count * modes * 8 > MOST_BYTES:
+        raise ValueError(f"--t-end: {count} snapshots are too many to keep; give an earlier end.")
+    return schedule.interval * np.arange(count + 1)
 
 
 def scene_maker(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from itertools import product
 from pathlib import Path
 
 import jax
@@ -18,7 +16,7 @@ from jaxsph.cli import (
     reynolds_numbers,
     seed,
 )
-from jaxsph.cli.options import MOST_NUMBERS, add_json_option, write_json
+from jaxsph.cli.options import add_json_option, write_json
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
@@ -26,11 +24,12 @@ from jaxsph_command.config import repeating
 
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
-from .options import bar, by_name, named_numbers, said
+from ..points.files.whole_file import format_of
+from .label_predictions import LABELS, predict_on_labels
+from .options import MOST_BYTES, bar, named_numbers, said, wanted_points, wanted_times
 from .predicted import print_prediction, results_of, write_report
 
 _MOST_FILES = 100  # with fields or tracers
-_MOST_BYTES = 4 * 2**30  # of all coordinates
 _MEMBERS_IN = ("fields", "tracers")  # folders beside prediction.h5
 _REPORTS = ("report.html", "report.json")
 
@@ -41,7 +40,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "Run a model that `jaxsph-rom train` or `jaxsph_rom.train` made at any number "
         "of parameters at once, and write their coordinates over time to DIR/prediction.h5, "
         "with a page that tells of them, DIR/report.html, and its numbers, report.json. Those of "
-        "an earlier prediction in DIR are removed, with its fields and tracers."
+        "an earlier prediction in DIR are removed, with its fields and tracers. Of a model that "
+        "`jaxsph-rom labels` made, write each member's particles to DIR/member-NNN.h5."
     )
     parser.set_defaults(command=_predict)
     add = parser.add_argument
@@ -67,12 +67,14 @@ def add_to(parser: Parser, words: list[str]) -> None:
 def _predict(options) -> int:
     folder = options.out or Path("out", f"predict-{options.model.stem}")
     path = folder / "prediction.h5"
+    if format_of(options.model) == LABELS:
+        return predict_on_labels(options, folder)
     check_target(path)
     with jax.enable_x64(True):  # whatever the file holds is kept
         trained = load(options.model)
     with jax.enable_x64(trained.flow.reference.points.dtype == np.float64):
-        points = _points(options, trained)
-        times = _times(options, trained)
+        points = wanted_points(options, trained.names)
+        times = wanted_times(options, trained.schedule, trained.flow.basis.size)
         _check(options, trained, points, times)
         with bar(f"M = {trained.flow.basis.size}", len(points)) as report:
             prediction = trained.predict(
@@ -90,39 +92,11 @@ def _predict(options) -> int:
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
 
-def _points(options, trained: TrainedModel) -> np.ndarray:
-    """A row of parameters a member."""
-    given = by_name([*(("reynolds", v) for v in options.reynolds or ()), *(options.at or ())])
-    if set(given) != set(trained.names):
-        wanted = " ".join(f"{name}=..." for name in trained.names)
-        raise ValueError(f"--at: give a value of each parameter of the model: --at {wanted}")
-    count = math.prod(len(values) for values in given.values())
-    if count > MOST_NUMBERS:
-        raise ValueError(f"--at: {count} combinations; give at most {MOST_NUMBERS} a call.")
-    return np.array(list(product(*(given[name] for name in trained.names))))
-
-
-def _times(options, trained: TrainedModel) -> np.ndarray | None:
-    """Whole snapshot intervals to the end that is asked for."""
-    if options.t_end is None:
-        return None
-    count = max(1, round(options.t_end / trained.schedule.interval))
-    nearest = count * trained.schedule.interval
-    if abs(nearest - options.t_end) > 1e-6 * nearest:
-        raise ValueError(
-            f"--t-end: {options.t_end:g} s is no whole number of snapshot intervals of "
-            f"{trained.schedule.interval:g} s; the nearest is {nearest:g} s."
-        )
-    if count * trained.flow.basis.size * 8 > _MOST_BYTES:
-        raise ValueError(f"--t-end: {count} snapshots are too many to keep; give an earlier end.")
-    return trained.schedule.interval * np.arange(count + 1)
-
-
 def _check(options, trained: TrainedModel, points, times) -> None:
     """A ValueError for what asks too much."""
     count, snapshots = len(points), trained.schedule.intervals if times is None else len(times) - 1
     size = count * (snapshots + 1) * trained.flow.basis.size * points.itemsize
-    if size > _MOST_BYTES:
+    if size > MOST_BYTES:
         raise ValueError(
             f"--at: {count} members over {snapshots} snapshots make {size / 2**30:.3g} GiB; "
             "give fewer or an earlier --t-end."

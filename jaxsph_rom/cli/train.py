@@ -96,7 +96,7 @@ def _train(options) -> int:
         plan = _plan(options, values)
         check_closure(options)
         reduction = REDUCTIONS[options.reduction]
-        parameters = _points(values or {"reynolds": plan.train})
+        parameters = combinations(values or {"reynolds": plan.train})
         closure = _closure(options, parameters)
 
         def check(family: Family) -> None:
@@ -134,7 +134,7 @@ def _train(options) -> int:
     return 0
 
 
-def _points(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
+def combinations(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
     """All combinations, from the largest values on."""
     count = math.prod(map(len, values.values()))
     if count > MOST_NUMBERS:

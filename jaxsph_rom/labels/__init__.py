@@ -13,3 +13,4 @@ from .mixing import mixed_from as mixed_from
 from .mixing import parted_share as parted_share
 from .sampled_system import SampledSystem as SampledSystem
 from .training import train as train
+from .training import training_scenes as training_scenes

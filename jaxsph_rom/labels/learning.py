@@ -21,6 +21,7 @@ from .label_system import LabelSystem
 from .products import products
 
 _EDGE = 3  # snapshots at both ends that a filter and a difference spoil
+SNAPSHOTS = 2 * _EDGE + 5  # the fewest that rates are learnt from
 _RIDGES = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the products' mean squares
 _RECOVERY_RIDGE = 1e-6
 STEPS = 2  # of RK4 from snapshot to snapshot
@@ -145,8 +146,8 @@ def _recovery(runs, known, size):
 def _known(runs, inputs, interval):
     """Products of all runs, without the ends, and their sizes."""
     count = len(runs[0].coordinates)
-    if count < 2 * _EDGE + 5:
-        raise ValueError(f"runs: {count} snapshots; rates need {2 * _EDGE + 5}. Record more often.")
+    if count < SNAPSHOTS:
+        raise ValueError(f"runs: {count} snapshots; rates need {SNAPSHOTS}. Record more often.")
     times = interval * np.arange(count)
     features = (_features(inputs, r.coordinates, times, r.values) for r in runs)
     known = np.concatenate([np.asarray(f, float)[_EDGE:-_EDGE] for f in features])

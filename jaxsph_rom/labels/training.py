@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jaxsph import Schedule, Trajectory, run_scene
 from jaxsph.scenes import Scene
 
-from ..basis.low_pass import low_pass
+from ..basis.low_pass import least_snapshots, low_pass
 from ..points.dynamics.energy_bound import EnergyBound
 from ..points.dynamics.sampling import Sampling
 from ..points.parameters.family import Family, refuse_unlike, table
@@ -22,7 +22,7 @@ from .displacement import label_snapshots
 from .inputs import Inputs
 from .label_basis import LabelBasis
 from .label_model import LabelModel
-from .learning import STEPS, LabelRun, error_on, learn
+from .learning import SNAPSHOTS, STEPS, LabelRun, error_on, learn
 from .mixing import MIXED, mixed_from
 from .sampling import check_sampling, sample
 
@@ -77,15 +77,9 @@ def train(
             raise ValueError(f"{name}: a number from 1 on, got {value!r}.")
     family = make if isinstance(make, Family) else Family(make)
     names, points = table(parameters)
-    if not names or not len(points):
-        raise ValueError("parameters: name at least one, as {'amplitude': 0.05}.")
     named = [dict(zip(names, map(float, point), strict=True)) for point in points]
-    scenes = [family.scene(one) for one in named]
+    scenes = training_scenes(family, named, sampling)
     first = scenes[0]
-    for one, scene in zip(named, scenes, strict=True):
-        _refuse(first, scene, one)
-    if sampling is not None:
-        check_sampling(sampling, first)
     if runs is None:
         runs = [run_scene(scene, measure=None) for scene in scenes]
     _check_runs(scenes, runs, named)
@@ -131,6 +125,31 @@ def train(
     )  # fmt: skip
 
 
+def training_scenes(
+    family: Family, parameters: Sequence[Mapping[str, float]], sampling: Sampling | None = None
+) -> list[Scene]:
+    """The scenes of training points, and before any is run what `train` would refuse of them.
+
+    Raises:
+        ValueError: as `train`, of scenes and samples.
+    """
+    if not parameters or not parameters[0]:
+        raise ValueError("parameters: name at least one, as {'amplitude': 0.05}.")
+    scenes = [family.scene(one) for one in parameters]
+    for one, scene in zip(parameters, scenes, strict=True):
+        _refuse(scenes[0], scene, one)
+    if sampling is not None:
+        check_sampling(sampling, scenes[0])
+    found = scenes[0].schedule.intervals + 1
+    needed = SNAPSHOTS if _cutoff(scenes[0]) is None else max(SNAPSHOTS, least_snapshots())
+    if found < needed:
+        raise ValueError(
+            f"end_time: gives {found} snapshots, and a model on labels needs {needed}; record more "
+            "often, or end later."
+        )
+    return scenes
+
+
 def _refuse(first: Scene, scene: Scene, parameters: Mapping[str, float], run: bool = True) -> None:
     refuse_unlike(first, scene, parameters, run)
     if not np.array_equal(first.state.position, scene.state.position):
@@ -161,12 +180,17 @@ def _check_runs(scenes, runs, named) -> None:
 
 def _quiet(scene: Scene, run: Trajectory):
     """Motion and density of a run without sound, where snapshots are often enough to tell it."""
-    parts = label_snapshots(run, scene.space.box)
-    height = float(np.ptp(np.asarray(scene.state.position)[:, -1])) + scene.space.spacing
-    cutoff = _SOUND * float(scene.fluid.sound_speed) / (4.0 * height)
-    if cutoff * scene.schedule.interval > 0.5 * _NYQUIST:
+    parts, cutoff = label_snapshots(run, scene.space.box), _cutoff(scene)
+    if cutoff is None:
         return parts
     return tuple(low_pass(part.T[:, None, :], run.time, cutoff)[:, 0].T for part in parts)
+
+
+def _cutoff(scene: Scene) -> float | None:
+    """Below the slowest sound [Hz]; None where snapshots are too rare to tell it."""
+    height = float(np.ptp(np.asarray(scene.state.position)[:, -1])) + scene.space.spacing
+    cutoff = _SOUND * float(scene.fluid.sound_speed) / (4.0 * height)
+    return None if cutoff * scene.schedule.interval > 0.5 * _NYQUIST else cutoff
 
 
 def _start(scene: Scene, motion: LabelBasis, modes: int) -> Float[np.ndarray, " modes"]:

@@ -1,0 +1,59 @@
+"""`jaxsph-rom labels`, and `jaxsph-rom predict` of what it makes."""
+
+import json
+
+import numpy as np
+import pytest
+
+from jaxsph.io import read_trajectory
+from jaxsph_rom.cli import main
+
+WAVE = "labels standing-wave --resolution 16 --time-step 0.025 --t-end 8 --modes 3"
+TRAINED = "--train amplitude=0.03,0.06 reynolds=500"
+
+
+def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([*WAVE.split(), *TRAINED.split(), "--json", "trained.json"]) == 0
+    told = json.loads((tmp_path / "trained.json").read_text())
+    assert (told["modes"], told["labels"]) == (3, 128) and told["error"] < 0.05
+    out, model = tmp_path / "out" / "labels-standing-wave", "out/labels-standing-wave/model.h5"
+    assert len(list((out / "full").rglob("*.h5"))) == 2
+    (out / "model.h5").unlink()
+    capsys.readouterr()
+    assert main([*WAVE.split(), *TRAINED.split()]) == 0  # full runs are kept
+    assert "error on its runs" in capsys.readouterr().out
+    at = ["--at", "amplitude=0.045,0.07", "reynolds=500"]
+    assert main(["predict", model, *at, "--out", "waves", "--json", "waves.json"]) == 0
+    printed = capsys.readouterr()
+    assert "1 of 2 members are outside of the training runs" in printed.err
+    assert "waves/member-001.h5" in printed.out
+    members = json.loads((tmp_path / "waves.json").read_text())["members"]
+    assert [m["parameters"]["amplitude"] for m in members] == [0.045, 0.07]
+    assert all(m["fault"] is None and m["labels_mix_from"] is None for m in members)
+    runs = [read_trajectory(tmp_path / m["file"]) for m in members]
+    heights = [run.position[0, :, 1] - run.position[3, :, 1] for run in runs]
+    assert np.abs(heights[1]).max() > np.abs(heights[0]).max() > 0.0
+    assert main(["predict", model, "--at", "amplitude=0.05", "reynolds=500", "--out", "waves"]) == 0
+    assert [f.name for f in sorted((tmp_path / "waves").glob("*.h5"))] == ["member-000.h5"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (WAVE, "--train"),
+        (f"{WAVE} --train depth=1", "has no depth"),
+        (f"{WAVE} {TRAINED} --amplitude 0.02", "given as a setting too"),
+        (f"{WAVE} {TRAINED} --samples 500", "samples: 500 asked for, but there are 1 to 128"),
+        (
+            "labels standing-wave --resolution 16 --t-end 1 --train amplitude=0.03,0.06",
+            "snapshots, and a model on labels needs",
+        ),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_run(words, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(words.split()) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not list(tmp_path.rglob("*.h5"))
