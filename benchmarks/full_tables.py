@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import product
 
+from .references.dam_break_3d import ARRIVAL, HEIGHT
 from .table_text import Row, density, markdown, results, several, short
 
 
@@ -194,6 +195,26 @@ def free_flows() -> str:
         )
     ]
     return markdown(header, rows)
+
+
+def dam_break_3d() -> str:
+    """Water heights at the gauges beside the experiment's."""
+    shown = (0.5, 1.0, 1.5, 2.0)
+    header = ("along the tank", "gauge", "front there [s]", "measured",
+              *(f"height at {t:g} s, measured [m]" for t in shown), "mean off [%]")  # fmt: skip
+
+    def line(row, name):
+        at = [round(t / row["time"][1]) for t in shown]
+        arrival = row.get(f"{name}_arrival")
+        return (
+            str(row["resolution"]), name, "" if arrival is None else short(arrival, 2),
+            short(ARRIVAL[name], 3) if name in ARRIVAL else "",
+            *(f"{row[name][k]:.2f}, {HEIGHT[name][k]:.2f}" for k in at),
+            short(row[f"{name}_off_percent"], 2),
+        )  # fmt: skip
+
+    rows = sorted(results("dam_break_3d"), key=lambda row: row["resolution"])
+    return markdown(header, (line(row, name) for row in rows for name in reversed(HEIGHT)))
 
 
 def versions() -> str:

@@ -1,4 +1,4 @@
-"""What benchmarks of open flows share: a run and its row, where a mean flow turns along a line."""
+"""What benchmarks of flows past bodies share: a run and its row, where a mean flow turns."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from jaxsph.scenes import Scene
 from .measure import progress
 
 
-def ran(scene: Scene, label: str) -> tuple[Trajectory, dict[str, Any]]:
-    """A run, shown as it goes, as far as it came; its size, times, density and fault."""
+def ran(scene: Scene, label: str, **recorded) -> tuple[Trajectory, dict[str, Any]]:
+    """A run, shown as it goes, as far as it came; its size, times, density and fault. What is
+    recorded beside it is `run_scene`'s to say."""
     fault = None
     with progress(label, scene.steps) as report:
         try:
-            trajectory = run_scene(scene, progress=report)
+            trajectory = run_scene(scene, progress=report, **recorded)
         except SimulationError as error:
             fault, trajectory = str(error), error.trajectory
+    rest = float(scene.fluid.reference_density)
     return trajectory, {
         "particles": trajectory.particles,
         "steps": scene.steps,
         "seconds": trajectory.timing.run_seconds,
         "compile_seconds": trajectory.timing.compile_seconds,
-        "density_deviation_percent": float(100.0 * np.abs(trajectory.density - 1.0).max()),
+        "density_deviation_percent": float(100.0 * np.abs(trajectory.density / rest - 1.0).max()),
         "fault": fault,
         "environment": environment(),
     }

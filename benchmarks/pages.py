@@ -14,6 +14,7 @@ from collections.abc import Callable
 from .body_tables import floating_box, light_bodies, taylor_couette
 from .full_tables import (
     cavity_of_pysph,
+    dam_break_3d,
     free_flows,
     right_hand_sides,
     schemes,
@@ -75,6 +76,7 @@ TABLES: dict[str, Callable[[], str]] = {
         cavity_of_pysph,
         still_water,
         free_flows,
+        dam_break_3d,
         particle_vortex,
         particle_cavity,
         predicted_vortex,

@@ -41,6 +41,7 @@ OPTIONS = {
     "open-cavity": "--resolution 40 --t-end 0.5",
     "channel-cylinder": "--resolution 33 --t-end 2",
     "backward-facing-step": "--t-end 20",
+    "dam-break-3d": "--t-end 0.7",
     "cylinder": "--resolution 10 --width 6 --upstream 4 --downstream 6 --t-end 60",
 }
 

@@ -22,7 +22,7 @@ from tests.test_pairs import HARDEST, Case
 from tests.test_wall_sums import case as walled
 
 FINER = {"open-cavity": 24, "channel-cylinder": 24, "piston-wave-maker": 64,
-         "floating-box": 60}  # as their walls need  # fmt: skip
+         "floating-box": 60, "dam-break-3d": 104}  # as their walls need  # fmt: skip
 QUICK = ("taylor-green", "lid-driven-cavity", "dam-break", "oscillating-drop")  # unlike each other
 
 

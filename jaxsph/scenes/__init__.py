@@ -10,6 +10,7 @@ from .continued import continued as continued
 from .couette import couette as couette
 from .cylinder import cylinder as cylinder
 from .dam_break import dam_break as dam_break
+from .dam_break_3d import dam_break_3d as dam_break_3d
 from .elliptic_drop import elliptic_drop as elliptic_drop
 from .enclosed import enclosed_flow as enclosed_flow
 from .floating_box import floating_box as floating_box
@@ -47,6 +48,7 @@ SCENES = {
     "backward-facing-step": backward_facing_step,
     "hydrostatic-tank": hydrostatic_tank,
     "dam-break": dam_break,
+    "dam-break-3d": dam_break_3d,
     "elliptic-drop": elliptic_drop,
     "gresho-vortex": gresho_vortex,
     "oscillating-drop": oscillating_drop,

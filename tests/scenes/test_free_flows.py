@@ -42,6 +42,7 @@ SMALL = {
     "couette": 25,
     "poiseuille": 25,
     "dam-break": 50,
+    "dam-break-3d": 104,
     "open-cavity": None,
     "piston-wave-maker": 72,
     "floating-box": 60,
@@ -86,8 +87,9 @@ def test_a_scene_compiles_to_the_same_program_without_the_files_of_other_effects
     gone = {
         "effects": ["free_surface", "surface_shifting", "surface_diffusion", "surface_tension",
                     "tensile_control", "artificial_viscosity", "background_pressure"],
-        "scenes": ["dam_break", "elliptic_drop", "oscillating_drop", "rotating_square_patch",
-                   "standing_wave", "piston_wave_maker", "shear_layer", "floating_box"],
+        "scenes": ["dam_break", "dam_break_3d", "elliptic_drop", "oscillating_drop",
+                   "rotating_square_patch", "standing_wave", "piston_wave_maker", "shear_layer",
+                   "floating_box"],
     }  # fmt: skip
     for folder, names in gone.items():
         init = package / folder / "__init__.py"
@@ -235,6 +237,7 @@ def test_settings_out_of_range_are_named(make, options, message):
     "name",
     [
         "dam-break",
+        "dam-break-3d",
         "standing-wave",
         "piston-wave-maker",
         "floating-box",
