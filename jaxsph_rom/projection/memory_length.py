@@ -116,7 +116,7 @@ class ConvectiveMemory(MemoryLength):
 def projected_jacobian(
     model: ReducedModel, state: ReducedState
 ) -> Callable[[Float[Array, " modes"]], Float[Array, " modes"]]:
-    """v -> Phi^+ J Phi v at the state's positions, J the Jacobian of f-bar; by `jax.jvp`.
+    """v -> Phi^+ J Phi v at the state's positions, J the Jacobian of f-bar; by `jax.linearize`.
 
     Args:
         model: its projection is not used.
@@ -132,7 +132,7 @@ def projected_jacobian(
         rates, _ = model.stacked_rates(start, stacked, state.position, auxiliary, coordinates)
         return inverse(rates)
 
-    return lambda direction: jax.jvp(rates, (state.coordinates,), (direction,))[1]
+    return jax.linearize(rates, state.coordinates)[1]
 
 
 @eqx.filter_jit
