@@ -21,6 +21,10 @@ from .options import MOST_BYTES, said, wanted_points, wanted_times
 LABELS = KIND[0]  # the format of their files
 _MOST_FILES = 100
 _NAME = "member-{:03d}.h5"
+_DOUBTS = {
+    "labels_mix_from": "its labels mix",
+    "samples_miss_particles_from": "its samples meet particles that are not followed",
+}
 
 
 def predict_on_labels(options, folder: Path) -> int:
@@ -41,8 +45,8 @@ def predict_on_labels(options, folder: Path) -> int:
         _warn(model, prediction)
         for file in folder.glob(_NAME.format(0).replace("000", "*")):
             file.unlink()
-        mixed = [_written(folder, prediction, k) for k in range(len(prediction))]
-    results = _results(options, model, prediction, mixed, folder)
+        doubts = [_written(folder, prediction, k) for k in range(len(prediction))]
+    results = _results(options, model, prediction, doubts, folder)
     write_json(options.json, {**results, **environment()})
     _print(results, model, prediction)
     return 0
@@ -64,14 +68,15 @@ def _check(model: LabelModel, count: int, times) -> None:
         )
 
 
-def _written(folder: Path, prediction: LabelPrediction, member: int) -> float | None:
-    """Write a member; when its labels mix [s], if they do."""
+def _written(folder: Path, prediction: LabelPrediction, member: int) -> dict[str, float | None]:
+    """Write a member; from when on it is not to be believed [s], if it is not."""
     if not prediction.good(member):
-        return None
+        return dict.fromkeys(_DOUBTS)
     run = prediction.fields(member)
     run.metadata["parameters"] = _parameters(prediction, member)
     run.save(folder / _NAME.format(member), overwrite=True)
-    return prediction.mixed_from(member)
+    found = prediction.mixed_from(member), prediction.strayed_from(member)
+    return dict(zip(_DOUBTS, found, strict=True))
 
 
 def _parameters(prediction: LabelPrediction, member: int) -> dict[str, float]:
@@ -87,7 +92,7 @@ def _warn(model: LabelModel, prediction: LabelPrediction) -> None:
               file=sys.stderr)  # fmt: skip
 
 
-def _results(options, model, prediction, mixed, folder):
+def _results(options, model, prediction, doubts, folder):
     return {
         "model": options.model,
         "scene": model.scene,
@@ -102,7 +107,7 @@ def _results(options, model, prediction, mixed, folder):
             {
                 "parameters": _parameters(prediction, k),
                 "file": folder / _NAME.format(k) if prediction.good(k) else None,
-                "labels_mix_from": mixed[k],
+                **doubts[k],
                 "fault": explanation(prediction.status[k]) if prediction.status[k] else None,
             }
             for k in range(len(prediction))
@@ -125,6 +130,7 @@ def _print(results, model: LabelModel, prediction: LabelPrediction) -> None:
         line = f"  {said(member['parameters'])}: {member['file'] or 'no snapshot'}"
         if member["fault"]:
             line += f", {member['fault']}"
-        if member["labels_mix_from"] is not None:
-            line += f", its labels mix from t = {member['labels_mix_from']:.3g} s on"
+        for name, told in _DOUBTS.items():
+            if member[name] is not None:
+                line += f", {told} from t = {member[name]:.3g} s on"
         print(line)

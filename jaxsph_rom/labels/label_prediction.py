@@ -75,6 +75,13 @@ class LabelPrediction(eqx.Module):
         """When the member's labels mix [s], if they do (`jaxsph_rom.labels.mixed_from`)."""
         return mixed_from(self.fields(member), self.model.space)
 
+    def strayed_from(self, member: int = 0) -> float | None:
+        """When the member's samples first meet particles that are not followed [s], if they do:
+        from then on its rates lack them. None for a model without samples."""
+        run, model = self.fields(member), self.model
+        strayed = model.system.strayed(run.position, model.labels, model.space)
+        return float(run.time[int(np.argmax(strayed))]) if strayed.any() else None
+
     def _rows(self) -> dict[str, str]:
         rows = {"members": str(len(self))}
         rows |= {name: spread(values, "").rstrip() for name, values in self.parameters.items()}

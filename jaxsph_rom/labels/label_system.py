@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import equinox as eqx
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from jaxsph import Space
 
 from ..points.dynamics.base import Dynamics
 from .inputs import Inputs
@@ -31,3 +34,13 @@ class LabelSystem(Dynamics):
     ) -> Float[Array, " recovered"]:
         """b."""
         return self.recovery @ products(coordinates, self.inputs(time, values))
+
+    def strayed(
+        self,
+        position: Float[np.ndarray, "times particles dim"],
+        labels: Float[np.ndarray, "particles dim"],
+        space: Space,
+    ) -> Bool[np.ndarray, " times"]:
+        """When particles are where the system no longer knows what moves them; never, if its rates
+        are none of single particles."""
+        return np.zeros(len(position), bool)

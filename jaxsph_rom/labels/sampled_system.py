@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import final
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+from scipy.spatial import cKDTree
 
 from jaxsph import ParticleState
 from jaxsph.neighbors import VerletList, WallList
@@ -66,6 +68,21 @@ class SampledSystem(LabelSystem):
         rates = jnp.concatenate([found.position - state.velocity, found.velocity], axis=1)
         seen = rates[: self.gather.shape[1]]
         return self.carried @ b + self.carried_centre + jnp.einsum("mpf,pf->m", self.gather, seen)
+
+
+    def strayed(self, position, labels, space):
+        """When a particle is within the kernel's support of a sample that is not followed: it is
+        missing in the sample's rates."""
+        _, members = cKDTree(labels).query(np.asarray(self.labels))
+        samples, box = members[: self.gather.shape[1]], space.box
+        lengths, periodic = np.asarray(box.lengths), np.asarray(box.periodic)
+        found = np.zeros(len(position), bool)
+        for k, place in enumerate(np.asarray(position, float)):
+            inside = np.where(periodic, (place - np.asarray(box.lower)) % lengths, place)
+            tree = cKDTree(inside, boxsize=np.where(periodic, lengths, 0.0))
+            near = tree.query_ball_point(inside[samples], space.support)
+            found[k] = len(np.setdiff1d(np.concatenate(near), members)) > 0
+        return found
 
 
 def state_at(

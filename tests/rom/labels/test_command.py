@@ -31,6 +31,7 @@ def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
     members = json.loads((tmp_path / "waves.json").read_text())["members"]
     assert [m["parameters"]["amplitude"] for m in members] == [0.045, 0.07]
     assert all(m["fault"] is None and m["labels_mix_from"] is None for m in members)
+    assert all(m["samples_miss_particles_from"] is None for m in members)
     runs = [read_trajectory(tmp_path / m["file"]) for m in members]
     heights = [run.position[0, :, 1] - run.position[3, :, 1] for run in runs]
     assert np.abs(heights[1]).max() > np.abs(heights[0]).max() > 0.0

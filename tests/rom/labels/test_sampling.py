@@ -57,6 +57,19 @@ def test_samples_see_all_that_moves_them(sampled):
 
 
 @pytest.mark.slow  # its programs take seconds to compile
+def test_particles_that_samples_do_not_know_are_named(sampled):
+    """In the run that it was trained on none comes near; one that is put near is seen."""
+    prediction = sampled.predict({"amplitude": 0.05})
+    assert prediction.strayed_from(0) is None
+    labels, space = sampled.labels, sampled.space
+    still = np.repeat(labels[None], 2, axis=0)
+    assert not sampled.system.strayed(still, labels, space).any()
+    followed = (np.asarray(sampled.system.labels)[:, None] == labels).all(axis=2).any(axis=0)
+    stranger, sample = int(np.flatnonzero(~followed)[0]), np.asarray(sampled.system.labels[0])
+    still[1, stranger] = sample + 0.5 * space.support * np.asarray([1.0, 0.0])
+    np.testing.assert_array_equal(sampled.system.strayed(still, labels, space), [False, True])
+
+
 def test_rates_differentiate(sampled):
     """Along a direction, forward and backward, against central differences."""
     system, values = sampled.system, jnp.zeros(0)
