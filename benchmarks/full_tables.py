@@ -200,20 +200,22 @@ def free_flows() -> str:
 def dam_break_3d() -> str:
     """Water heights at the gauges beside the experiment's."""
     shown = (0.5, 1.0, 1.5, 2.0)
-    header = ("along the tank", "gauge", "front there [s]", "measured",
+    header = ("scheme", "along the tank", "gauge", "front there [s]", "measured",
               *(f"height at {t:g} s, measured [m]" for t in shown), "mean off [%]")  # fmt: skip
 
     def line(row, name):
-        at = [round(t / row["time"][1]) for t in shown]
-        arrival = row.get(f"{name}_arrival")
+        at = {t: round(t / row["time"][1]) for t in shown if t <= row["time"][-1] + 1e-9}
+        arrival, ours, theirs = row.get(f"{name}_arrival"), row[name], HEIGHT[name]
         return (
-            str(row["resolution"]), name, "" if arrival is None else short(arrival, 2),
+            row["scheme"], str(row["resolution"]), name,
+            "" if arrival is None else short(arrival, 2),
             short(ARRIVAL[name], 3) if name in ARRIVAL else "",
-            *(f"{row[name][k]:.2f}, {HEIGHT[name][k]:.2f}" for k in at),
+            *(f"{ours[at[t]]:.2f}, {theirs[at[t]]:.2f}" if t in at else "" for t in shown),
             short(row[f"{name}_off_percent"], 2),
         )  # fmt: skip
 
-    rows = sorted(results("dam_break_3d"), key=lambda row: row["resolution"])
+    rows = [row for row in results("dam_break_3d") if row["fault"] is None]
+    rows.sort(key=lambda row: (row["scheme"], row["resolution"]))
     return markdown(header, (line(row, name) for row in rows for name in reversed(HEIGHT)))
 
 

@@ -109,6 +109,10 @@ def larger_cavity() -> str:
 def particle_step() -> str:
     """What a step on moving particles costs, times of the process."""
     header = ("scene", "particles", "M", "projection", "full [ms]", "reduced [ms]", "ratio")
+    rows = sorted(
+        results("particle_step"),
+        key=lambda row: (row["scene"] != "taylor-green", row["projection"] != "galerkin"),
+    )
     return markdown(
         header,
         (
@@ -121,7 +125,7 @@ def particle_step() -> str:
                 short(1e3 * row["process_seconds"]["median"], 3),
                 short(row["process_ratio"]),
             )
-            for row in results("particle_step")
+            for row in rows
         ),
     )
 

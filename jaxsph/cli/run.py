@@ -41,7 +41,6 @@ def add_to(parser: Parser, words: list[str]) -> None:
     )
     parser.set_defaults(command=_run)
     add = parser.add_argument
-    add_scene_options(parser, words)
     add("--steps", choices=tuple(STEPPING), default="fixed", help=_STEPS_HELP)
     add("--capacity-margin", type=margin, metavar="X", help=_MARGIN_HELP)
     add("--devices", type=positive_int, metavar="N", help=_DEVICES_HELP)
@@ -49,6 +48,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add_json_option(parser)
     add("--overwrite", action="store_true", help="replace a trajectory.h5 that is there")
     add_resume_options(parser)
+    add_scene_options(parser, words)  # last: its settings leave taken options alone
 
 
 def _run(options) -> int:

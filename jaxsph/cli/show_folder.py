@@ -15,6 +15,7 @@ _LISTED = 40  # files and folders
 _OF_FORMAT = {
     "jaxsph sweep": ("runs of a sweep", "jaxsph show {}"),
     "jaxsph reduced flow": ("a reduced model", "jaxsph-rom predict {}"),
+    "jaxsph reduced labels": ("a reduced model on labels", "jaxsph-rom predict {}"),
     "jaxsph prediction": ("coordinates of reduced runs", "jaxsph show {}"),
     "VTKHDF": ("a run for ParaView", "open {} in ParaView"),
 }

@@ -45,13 +45,13 @@ def add_to(parser: Parser, words: list[str]) -> None:
     )
     parser.set_defaults(command=_sweep)
     add = parser.add_argument
-    add_scene_options(parser, words, _APART)
     add("--batch", type=positive_int, default=1, metavar="K",
         help="members that a device runs side by side; more than one pays on an accelerator "
         "(default: %(default)s)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder of the results, or a file "
         "ending with .h5 (default: out/SCENE)")
     add_json_option(parser)
+    add_scene_options(parser, words, _APART)  # last: its settings leave taken options alone
 
 
 def _sweep(options) -> int:

@@ -27,9 +27,9 @@ GAUGES = {  # m, in the middle of the tank
     "H4": (2.638, 0.5),
 }
 SCALES = {
-    "small": Scale(resolution=110, h_over_dx=1.3, time_step=1e-3, steps_per_snapshot=20),
-    "half": Scale(resolution=165, h_over_dx=1.3, time_step=6.25e-4, steps_per_snapshot=32),
-    "paper": Scale(resolution=220, h_over_dx=1.3, time_step=5e-4, steps_per_snapshot=40),
+    "small": Scale(resolution=110, h_over_dx=1.3, time_step=6.25e-4, steps_per_snapshot=32),
+    "half": Scale(resolution=165, h_over_dx=1.3, time_step=4e-4, steps_per_snapshot=50),
+    "paper": Scale(resolution=220, h_over_dx=1.3, time_step=3.125e-4, steps_per_snapshot=64),
 }
 
 
@@ -40,7 +40,7 @@ def dam_break_3d(
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
-    end_time: float = 3.0,
+    end_time: float = 2.0,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,
@@ -55,7 +55,8 @@ def dam_break_3d(
     box, 0.161 m x 0.403 m x 0.161 m, begins 0.6635 m from the other end. The third axis points up.
     `GAUGES` are the places of the experiment's wave gauges, for `jaxsph.metrics.surface_height`;
     the force on the wall's part `box` is recorded. rho0 = 1000 kg/m^3, g = 9.81 m/s^2, the start is
-    hydrostatic, U = 2 (g H)^(1/2) the speed of the front of a column H high.
+    hydrostatic, U = 3 (g H)^(1/2) with H the column's height, as in `dam_break`. The tank has a lid
+    here.
 
     Args:
         resolution: particles along the tank; overrides the scale's, time step scaled along. The
@@ -94,7 +95,7 @@ def dam_break_3d(
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
         reference_density=REFERENCE_DENSITY,
-        reference_speed=2.0 * (GRAVITY * height) ** 0.5,
+        reference_speed=3.0 * (GRAVITY * height) ** 0.5,
         mach=mach,
         side=TANK[0],
         region=BoxRegion((length, 0.0, 0.0), (TANK[0], TANK[1], height)),

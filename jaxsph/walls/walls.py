@@ -242,7 +242,8 @@ def ghosts_in(
     regions: Sequence[Region], ghosts: Float[np.ndarray, "ghosts dim"], spacing: float
 ) -> list[Bool[np.ndarray, " ghosts"]]:
     """Which ghosts lie in each of some regions, those on its surface among them, as there are where
-    a wall crosses places of the lattice; one on the surfaces of several is in the first of them."""
+    a wall crosses places of the lattice; one on the surfaces of several is in the first of them,
+    and in all whose inside it is in."""
     found, taken = [], np.zeros(len(ghosts), bool)
     for region in regions:
         distance = distances(region, ghosts)

@@ -16,11 +16,10 @@ from jaxsph.io import check_target
 
 from ..labels import LabelModel, LabelPrediction, load
 from ..labels.label_model import KIND
+from .earlier_prediction import MEMBER, MOST_FILES, remove_earlier
 from .options import MOST_BYTES, said, wanted_points, wanted_times
 
 LABELS = KIND[0]  # the format of their files
-_MOST_FILES = 100
-_NAME = "member-{:03d}.h5"
 _DOUBTS = {
     "labels_mix_from": "its labels mix",
     "samples_miss_particles_from": "its samples meet particles that are not followed",
@@ -29,12 +28,13 @@ _DOUBTS = {
 
 def predict_on_labels(options, folder: Path) -> int:
     """Run it at the parameters of the command; a file for each member that has snapshots."""
-    if options.fields or options.tracers is not None:
-        raise ValueError(
-            "--fields, --tracers: are of models on points; the particles of a model on labels are "
-            "written anyway. Leave them out."
-        )
-    check_target(folder / _NAME.format(0))
+    for name, given in (("fields", options.fields), ("tracers", options.tracers is not None)):
+        if given:
+            raise ValueError(
+                f"--{name}: is of models on points; the particles of a model on labels are written "
+                "anyway. Leave it out."
+            )
+    check_target(folder / MEMBER.format(0))
     with jax.enable_x64(True):  # whatever the file holds is kept
         model = load(options.model)
     with jax.enable_x64(model.labels.dtype == np.float64):
@@ -43,8 +43,7 @@ def predict_on_labels(options, folder: Path) -> int:
         _check(model, len(points), times)
         prediction = model.predict(dict(zip(model.names, points.T, strict=True)), times=times)
         _warn(model, prediction)
-        for file in folder.glob(_NAME.format(0).replace("000", "*")):
-            file.unlink()
+        remove_earlier(folder)
         doubts = [_written(folder, prediction, k) for k in range(len(prediction))]
     results = _results(options, model, prediction, doubts, folder)
     write_json(options.json, {**results, **environment()})
@@ -54,9 +53,9 @@ def predict_on_labels(options, folder: Path) -> int:
 
 def _check(model: LabelModel, count: int, times) -> None:
     """A ValueError for what asks too much."""
-    if count > _MOST_FILES:
+    if count > MOST_FILES:
         raise ValueError(
-            f"--at: writes the particles of each of {count} members; give at most {_MOST_FILES}, "
+            f"--at: writes the particles of each of {count} members; give at most {MOST_FILES}, "
             "or use `jaxsph_rom.labels.load(FILE).predict` for coordinates alone."
         )
     snapshots = (model.schedule.intervals if times is None else len(times) - 1) + 1
@@ -72,15 +71,24 @@ def _written(folder: Path, prediction: LabelPrediction, member: int) -> dict[str
     """Write a member; from when on it is not to be believed [s], if it is not."""
     if not prediction.good(member):
         return dict.fromkeys(_DOUBTS)
-    run = prediction.fields(member)
-    run.metadata["parameters"] = _parameters(prediction, member)
-    run.save(folder / _NAME.format(member), overwrite=True)
+    run, model = prediction.fields(member), prediction.model
+    run.metadata["time_step"] = model.schedule.time_step
+    run.metadata["parameters"] = _parameters(prediction, member) | {
+        "reduced": {"modes": model.system.size, "labels": len(model.labels), **model.training},
+        "outside": bool(prediction.outside[member]),
+        "fault": _fault(prediction, member),
+    }
+    run.save(folder / MEMBER.format(member), overwrite=True)
     found = prediction.mixed_from(member), prediction.strayed_from(member)
     return dict(zip(_DOUBTS, found, strict=True))
 
 
 def _parameters(prediction: LabelPrediction, member: int) -> dict[str, float]:
     return {name: float(values[member]) for name, values in prediction.parameters.items()}
+
+
+def _fault(prediction: LabelPrediction, member: int) -> str | None:
+    return explanation(prediction.status[member]) if prediction.status[member] else None
 
 
 def _warn(model: LabelModel, prediction: LabelPrediction) -> None:
@@ -106,9 +114,9 @@ def _results(options, model, prediction, doubts, folder):
         "members": [
             {
                 "parameters": _parameters(prediction, k),
-                "file": folder / _NAME.format(k) if prediction.good(k) else None,
+                "file": folder / MEMBER.format(k) if prediction.good(k) else None,
                 **doubts[k],
-                "fault": explanation(prediction.status[k]) if prediction.status[k] else None,
+                "fault": _fault(prediction, k),
             }
             for k in range(len(prediction))
         ],

@@ -15,11 +15,10 @@ from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
 from jaxsph_command.config import NAME, write_config
 
-from ..labels import train, training_scenes
+from ..labels import check_run, train, training_scenes
 from ..points import QDEIM, Family
 from ..study import full_run
-from .options import bar, said, trained_at, training_values
-from .train import combinations
+from .options import bar, combinations, said, trained_at, training_values
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
@@ -29,9 +28,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "them, and write it to a file from which `jaxsph-rom predict` runs it at any of its "
         "parameters. Full runs are kept: the same command goes on where it was cut short."
     )
-    parser.set_defaults(command=_labels, precision="float64")
     add = parser.add_argument
-    add_scene_options(parser, words, {"reynolds": None})
     add("--train", type=training_values, nargs="+", required=True, metavar="NAME=VALUE",
         help="parameters of the scene to train on, several values with commas between them, or "
         "START:STOP:COUNT; all combinations are run")  # fmt: skip
@@ -45,6 +42,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--out", type=Path, metavar="DIR", help="folder of the model and its "
         "full runs, or a file ending with .h5 (default: out/labels-SCENE)")
     add_json_option(parser)
+    add_scene_options(parser, words, {"reynolds": None})
+    parser.set_defaults(command=_labels, precision="float64")
 
 
 def _labels(options) -> int:
@@ -57,12 +56,12 @@ def _labels(options) -> int:
         settings = scene_settings(options, options.make, options.precision)
         family = Family(lambda **named: made(options.make, {**settings, **named}))
         sampling = None if options.samples is None else QDEIM(options.samples)
-        scenes = training_scenes(family, parameters, sampling)
+        scenes = training_scenes(family, parameters, options.modes, sampling)
+        runs = []
         try:
-            runs = [
-                full_run(folder / "full", scene, bar, said(named))
-                for scene, named in zip(scenes, parameters, strict=True)
-            ]
+            for scene, named in zip(scenes, parameters, strict=True):
+                runs.append(full_run(folder / "full", scene, bar, said(named)))
+                check_run(scene, runs[-1], named)
             trained = train(family, parameters, options.modes, runs=runs, sampling=sampling)
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
@@ -85,7 +84,7 @@ def _labels(options) -> int:
     print_rows({
         "scene": f"{trained.scene}, {len(trained.labels)} particles, to t = "
         f"{trained.schedule.end_time:g} s",
-        "trained on": "; ".join(said(named) for named in parameters),
+        "trained on": "; ".join(said(named) for named in reversed(parameters)),
         "modes": f"{trained.system.size} of {trained.motion.size}",
         "full runs": f"{seconds:.3g} s",
         "offline": f"{told['offline_seconds']:.3g} s (decompose, {_made_by(told)})",

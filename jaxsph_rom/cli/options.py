@@ -35,9 +35,9 @@ FORMULATIONS = ("compressible", "solenoidal")
 
 
 def add_training_options(parser: Parser, words: list[str]) -> None:
-    """What full runs are made and how they are reduced."""
+    """What full runs are made and how they are reduced; after a command's own options, which the
+    scene's settings leave alone."""
     add = parser.add_argument
-    add_scene_options(parser, words, {"reynolds": None})
     add("--train", type=training_values, nargs="+", metavar="RE",
         help=f"Reynolds numbers to train on ({defaults('train')}), or START:STOP:COUNT; or other "
         "parameters of the scene, as NAME=VALUE,VALUE; all combinations are run")  # fmt: skip
@@ -46,6 +46,7 @@ def add_training_options(parser: Parser, words: list[str]) -> None:
     add("--settling", type=positive_float, metavar="T",
         help="time a run from rest takes before the studied time begins [s] "
         f"({defaults('settling')}; other scenes start from rest)")  # fmt: skip
+    add_scene_options(parser, words, {"reynolds": None})
     parser.set_defaults(precision="float64")
 
 
@@ -174,6 +175,15 @@ def said(parameters: Mapping[str, float]) -> str:
 def distinct(values) -> tuple[float, ...]:
     """Values without repetitions, in the order given."""
     return tuple(dict.fromkeys(values))
+
+
+def combinations(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
+    """All combinations, from the largest values on."""
+    count = math.prod(map(len, values.values()))
+    if count > MOST_NUMBERS:
+        raise ValueError(f"--train: {count} combinations; give at most {MOST_NUMBERS} a call.")
+    ordered = [sorted(of, reverse=True) for of in values.values()]
+    return [dict(zip(values, point, strict=True)) for point in product(*ordered)]
 
 
 def wanted_points(options, names: Sequence[str]) -> np.ndarray:

@@ -17,6 +17,7 @@ from jaxsph.cli import (
     seed,
 )
 from jaxsph.cli.options import add_json_option, write_json
+from jaxsph.cli.show_contents import file_format
 from jaxsph.environment import environment
 from jaxsph.integrate import SimulationError
 from jaxsph.io import check_target
@@ -24,14 +25,10 @@ from jaxsph_command.config import repeating
 
 from ..points import Prediction, TrainedModel, load, save_prediction
 from ..points.files.member_files import write_fields, write_tracers
-from ..points.files.whole_file import format_of
+from .earlier_prediction import MEMBER, MOST_FILES, PREDICTION, remove_earlier
 from .label_predictions import LABELS, predict_on_labels
 from .options import MOST_BYTES, bar, named_numbers, said, wanted_points, wanted_times
 from .predicted import print_prediction, results_of, write_report
-
-_MOST_FILES = 100  # with fields or tracers
-_MEMBERS_IN = ("fields", "tracers")  # folders beside prediction.h5
-_REPORTS = ("report.html", "report.json")
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
@@ -54,11 +51,12 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--t-end", type=positive_float, metavar="T",
         help="end time [s] (default: that of the training runs)")  # fmt: skip
     add("--fields", action="store_true",
-        help="write fields at the reference points to DIR/fields "
-        f"(up to {_MOST_FILES} runs)")  # fmt: skip
+        help="of a model on points, write fields at the reference points to DIR/fields "
+        f"(up to {MOST_FILES} runs)")  # fmt: skip
     add("--tracers", type=positive_int, metavar="N",
-        help="write N particles carried by the flow to DIR/tracers; they start at reference points "
-        f"drawn by --seed, at each of them if N is larger (up to {_MOST_FILES} runs)")  # fmt: skip
+        help="of a model on points, write N particles carried by the flow to DIR/tracers; they "
+        "start at reference points drawn by --seed, at each of them if N is larger (up to "
+        f"{MOST_FILES} runs)")  # fmt: skip
     add("--seed", type=seed, default=0, metavar="N", help="of the draw (default: 0)")
     add("--out", type=Path, metavar="DIR", help="folder for results (default: out/predict-MODEL)")
     add_json_option(parser)
@@ -66,8 +64,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
 
 def _predict(options) -> int:
     folder = options.out or Path("out", f"predict-{options.model.stem}")
-    path = folder / "prediction.h5"
-    if format_of(options.model) == LABELS:
+    path = folder / PREDICTION
+    if file_format(options.model) == LABELS:
         return predict_on_labels(options, folder)
     check_target(path)
     with jax.enable_x64(True):  # whatever the file holds is kept
@@ -81,7 +79,7 @@ def _predict(options) -> int:
                 dict(zip(trained.names, points.T, strict=True)), times=times, progress=report
             )
         _warn(trained, prediction)
-        _remove_earlier(folder)
+        remove_earlier(folder)
         save_prediction(path, prediction, options.model.name)
         lost = _write_members(options, trained, prediction, folder)
     results = results_of(trained, prediction, options.model, path)
@@ -102,10 +100,10 @@ def _check(options, trained: TrainedModel, points, times) -> None:
             "give fewer or an earlier --t-end."
         )
     for name in ("fields", "tracers"):
-        if getattr(options, name) and count > _MOST_FILES:
+        if getattr(options, name) and count > MOST_FILES:
             raise ValueError(
                 f"--{name}: writes a file for each of {count} members; give at most "
-                f"{_MOST_FILES}, or make fields by `Prediction.fields`."
+                f"{MOST_FILES}, or make fields by `Prediction.fields`."
             )
 
 
@@ -132,23 +130,11 @@ def _said(prediction: Prediction, member: int) -> str:
     return said(dict(zip(prediction.names, map(float, prediction.points[member]), strict=True)))
 
 
-def _remove_earlier(folder: Path) -> None:
-    """Take away what an earlier prediction left, which would stand beside this one's."""
-    for name in _REPORTS:
-        (folder / name).unlink(missing_ok=True)
-    for name in _MEMBERS_IN:
-        for pattern in ("re-*.h5", "member-*.h5", "re-*.vtkhdf", "member-*.vtkhdf"):
-            for file in (folder / name).glob(pattern):
-                file.unlink()
-        if (folder / name).is_dir() and not any((folder / name).iterdir()):
-            (folder / name).rmdir()
-
-
 def _names(prediction: Prediction) -> list[str]:
     """Files of the members."""
     if prediction.names == ("reynolds",):
         return [f"re-{number:.12g}.h5" for number in prediction.points[:, 0]]
-    return [f"member-{k:03d}.h5" for k in range(len(prediction))]
+    return [MEMBER.format(k) for k in range(len(prediction))]
 
 
 def _write_members(options, trained: TrainedModel, prediction: Prediction, folder: Path) -> str:

@@ -74,8 +74,6 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "Runs are kept in the output folder: the same command goes on where it was cut short."
     )
     add = parser.add_argument
-    add_training_options(parser, words)
-    parser.set_defaults(command=_run, inner_product=None)
     add("--predict", type=positive_float, nargs="+", metavar="RE",
         help=f"Reynolds numbers to run at ({defaults('predict')})")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", metavar="M",
@@ -116,6 +114,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "0.25)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
     add_json_option(parser)
+    add_training_options(parser, words)
+    parser.set_defaults(command=_run, inner_product=None)
 
 
 def memory_length(text: str) -> float | MemoryLength:

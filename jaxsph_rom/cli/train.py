@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import textwrap
 from collections.abc import Iterator
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,6 @@ import jax
 from jaxsph import Trajectory
 from jaxsph.cli import Parser, fail, positive_int, print_rows
 from jaxsph.cli.options import (
-    MOST_NUMBERS,
     add_json_option,
     bytes_in,
     bytes_told,
@@ -47,6 +44,7 @@ from .options import (
     add_training_options,
     bar,
     check_closure,
+    combinations,
     formulation,
     planned,
     said,
@@ -70,7 +68,6 @@ def add_to(parser: Parser, words: list[str]) -> None:
     )
     parser.set_defaults(command=_train)
     add = parser.add_argument
-    add_training_options(parser, words)
     add("--modes", type=positive_int, default=10, metavar="M",
         help="number of modes (default: %(default)s)")  # fmt: skip
     add("--reduction", choices=tuple(REDUCTIONS), default="tensors",
@@ -84,6 +81,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--out", type=Path, metavar="DIR", help="folder of the model and its "
         "full runs, or a file ending with .h5 (default: out/train-SCENE)")
     add_json_option(parser)
+    add_training_options(parser, words)
 
 
 def _train(options) -> int:
@@ -132,15 +130,6 @@ def _train(options) -> int:
     write_json(options.json, {**_results(trained, path), **environment()})
     _print(trained, runs[0].particles, path, folder)
     return 0
-
-
-def combinations(values: dict[str, tuple[float, ...]]) -> list[dict[str, float]]:
-    """All combinations, from the largest values on."""
-    count = math.prod(map(len, values.values()))
-    if count > MOST_NUMBERS:
-        raise ValueError(f"--train: {count} combinations; give at most {MOST_NUMBERS} a call.")
-    ordered = [sorted(of, reverse=True) for of in values.values()]
-    return [dict(zip(values, point, strict=True)) for point in product(*ordered)]
 
 
 def _plan(options, values: dict[str, tuple[float, ...]] | None) -> Plan:

@@ -12,5 +12,6 @@ from .label_system import LabelSystem as LabelSystem
 from .mixing import mixed_from as mixed_from
 from .mixing import parted_share as parted_share
 from .sampled_system import SampledSystem as SampledSystem
+from .training import check_run as check_run
 from .training import train as train
 from .training import training_scenes as training_scenes

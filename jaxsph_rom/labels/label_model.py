@@ -119,7 +119,8 @@ class LabelModel(eqx.Module):
             seconds.append(clock.perf_counter() - before)
         found = np.asarray(found)
         if times is None:
-            found = np.concatenate([starts[:, None], found], axis=1)
+            begun = np.isfinite(found[:, :1]).all(axis=2, keepdims=True)  # else lost at once
+            found = np.concatenate([np.where(begun, starts[:, None], np.nan), found], axis=1)
         return LabelPrediction(
             self, points, values, time, found, np.asarray(code), np.asarray(step),
             self._outside(points, time), seconds[1], max(0.0, seconds[0] - seconds[1]),
@@ -194,7 +195,7 @@ def load(path: str | os.PathLike) -> LabelModel:
         FlowFileError: if the file is not a whole file of such a model, of another schema, or needs
             double precision that JAX has not been told to use.
     """
-    return read_tree(path, KIND, "`LabelModel.save`", LabelModel)
+    return read_tree(path, KIND, "`jaxsph-rom labels`", LabelModel)
 
 
 @eqx.filter_jit

@@ -55,7 +55,7 @@ class LabelPrediction(eqx.Module):
 
     def good(self, member: int) -> int:
         """The number of a member's snapshots before its fault."""
-        lost = np.isnan(self.coordinates[member]).any(axis=-1)
+        lost = ~np.isfinite(self.coordinates[member]).all(axis=-1)
         return int(np.argmax(np.append(lost, True)))
 
     def fields(self, member: int = 0) -> Trajectory:
@@ -73,11 +73,12 @@ class LabelPrediction(eqx.Module):
 
     def mixed_from(self, member: int = 0) -> float | None:
         """When the member's labels mix [s], if they do (`jaxsph_rom.labels.mixed_from`)."""
-        return mixed_from(self.fields(member), self.model.space)
+        return mixed_from(self.fields(member), self.model.space) if self.good(member) else None
 
     def strayed_from(self, member: int = 0) -> float | None:
-        """When the member's samples first meet particles that are not followed [s], if they do:
-        from then on its rates lack them. None for a model without samples."""
+        """When particles that are not followed first come within the kernel's support of one of the
+        member's samples [s], if they do: from then on its rates lack them. Neighbours' neighbours
+        are not looked at. None for a model without samples."""
         run, model = self.fields(member), self.model
         strayed = model.system.strayed(run.position, model.labels, model.space)
         return float(run.time[int(np.argmax(strayed))]) if strayed.any() else None

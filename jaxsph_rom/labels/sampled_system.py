@@ -69,7 +69,6 @@ class SampledSystem(LabelSystem):
         seen = rates[: self.gather.shape[1]]
         return self.carried @ b + self.carried_centre + jnp.einsum("mpf,pf->m", self.gather, seen)
 
-
     def strayed(self, position, labels, space):
         """When a particle is within the kernel's support of a sample that is not followed: it is
         missing in the sample's rates."""

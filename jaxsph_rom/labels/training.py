@@ -78,7 +78,7 @@ def train(
     family = make if isinstance(make, Family) else Family(make)
     names, points = table(parameters)
     named = [dict(zip(names, map(float, point), strict=True)) for point in points]
-    scenes = training_scenes(family, named, sampling)
+    scenes = training_scenes(family, named, modes, sampling)
     first = scenes[0]
     if runs is None:
         runs = [run_scene(scene, measure=None) for scene in scenes]
@@ -126,26 +126,36 @@ def train(
 
 
 def training_scenes(
-    family: Family, parameters: Sequence[Mapping[str, float]], sampling: Sampling | None = None
+    make: Callable[..., Scene] | Family,
+    parameters: Sequence[Mapping[str, float]],
+    modes: int = 4,
+    sampling: Sampling | None = None,
 ) -> list[Scene]:
-    """The scenes of training points, and before any is run what `train` would refuse of them.
+    """The scenes of training points, where `train` would not refuse them for what they are.
 
     Raises:
-        ValueError: as `train`, of scenes and samples.
+        ValueError: as `train`, of scenes, samples, and numbers of snapshots and of modes.
     """
     if not parameters or not parameters[0]:
         raise ValueError("parameters: name at least one, as {'amplitude': 0.05}.")
+    family = make if isinstance(make, Family) else Family(make)
     scenes = [family.scene(one) for one in parameters]
+    first = scenes[0]
     for one, scene in zip(parameters, scenes, strict=True):
-        _refuse(scenes[0], scene, one)
+        _refuse(first, scene, one)
     if sampling is not None:
-        check_sampling(sampling, scenes[0])
-    found = scenes[0].schedule.intervals + 1
-    needed = SNAPSHOTS if _cutoff(scenes[0]) is None else max(SNAPSHOTS, least_snapshots())
+        check_sampling(sampling, first)
+    found = first.schedule.intervals + 1
+    needed = SNAPSHOTS if _cutoff(first) is None else max(SNAPSHOTS, least_snapshots())
     if found < needed:
         raise ValueError(
-            f"end_time: gives {found} snapshots, and a model on labels needs {needed}; record more "
+            f"t-end: gives {found} snapshots, and a model on labels needs {needed}; record more "
             "often, or end later."
+        )
+    if modes > found * len(scenes):
+        raise ValueError(
+            f"modes: {modes} asked for, more than the {found * len(scenes)} snapshots there will "
+            "be; ask for fewer, or record more."
         )
     return scenes
 
@@ -164,18 +174,23 @@ def _check_runs(scenes, runs, named) -> None:
     if len(runs) != len(scenes):
         raise ValueError(f"runs: {len(runs)} for {len(scenes)} training points; give one for each.")
     for scene, run, one in zip(scenes, runs, named, strict=True):
-        said = ", ".join(f"{name} = {value:g}" for name, value in one.items())
-        times = scene.schedule.times
-        alike = len(run.time) == len(times) and np.allclose(run.time, times, rtol=1e-6)
-        if not alike or not np.allclose(run.velocity[0], scene.state.velocity, atol=1e-6):
-            raise ValueError(f"runs: the one of {said} is none of its scene; run it anew.")
-        mixed = mixed_from(run, scene.space)
-        if mixed is not None:
-            raise ValueError(
-                f"runs: labels mix in the run of {said}: from {mixed:.3g} s on, more than "
-                f"{100.0 * MIXED:g} % of neighbours have parted. End the runs before, or make "
-                "gentler ones."
-            )
+        check_run(scene, run, one)
+
+
+def check_run(scene: Scene, run: Trajectory, parameters: Mapping[str, float]) -> None:
+    """Raise a ValueError if a full run is none of its scene, or labels mix in it."""
+    said = ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
+    times = scene.schedule.times
+    alike = len(run.time) == len(times) and np.allclose(run.time, times, rtol=1e-6)
+    if not alike or not np.allclose(run.velocity[0], scene.state.velocity, atol=1e-6):
+        raise ValueError(f"runs: the one of {said} is none of its scene; run it anew.")
+    mixed = mixed_from(run, scene.space)
+    if mixed is not None:
+        raise ValueError(
+            f"runs: labels mix in the run of {said}: from {mixed:.3g} s on, more than "
+            f"{100.0 * MIXED:g} % of neighbours have parted. End the runs before, or make "
+            "gentler ones."
+        )
 
 
 def _quiet(scene: Scene, run: Trajectory):

@@ -48,7 +48,7 @@ def test_commands_scenes_options_and_choices(complete):
     assert complete("jaxsph an") == {"animate"}
     assert complete("jaxsph-rom pre") == {"predict"}
     assert complete("jaxsph run ") >= set(SCENES)
-    assert complete("jaxsph run dam") == {"dam-break"}
+    assert complete("jaxsph run dam") == {"dam-break", "dam-break-3d"}
     assert complete("jaxsph run dam-break --al") == {"--alpha"}  # a setting of that scene
     assert complete("jaxsph run dam-break --reso") == {"--resolution"}
     assert complete("jaxsph run dam-break --scheme ") == set(SCHEMES)

@@ -37,6 +37,9 @@ def fails(speed=1.0):
 
 def nothing(speed=1.0):
     return None
+
+def occupied(out=1, samples=2, modes=3, batch=4, devices=5, train=6, hyper=7, speed=1.0):
+    return swirl(speed)
 '''
 
 
@@ -73,7 +76,7 @@ def test_an_own_scene_runs_and_goes_on_as_itself(capsys):
         (["run", "dam-braek"], "'dam-braek' is not known (did you mean dam-break?)"),
         (["run", "nowhere.py"], "there is no file nowhere.py"),
         (["run", "broken.py"], "broken.py, line 2: ZeroDivisionError: division by zero"),
-        (["run", "my_scene.py"], "has no function make; it has swirl, fails, nothing"),
+        (["run", "my_scene.py"], "has no function make; it has swirl, fails, nothing, occupied"),
         (["run", "my_scene.py:swril"], "no function swril (did you mean swirl?)"),
         (["run", "my_scene.py:swirl"], "missing 1 required positional argument: 'speed'"),
         (["run", "my_scene.py:fails"], "my_scene.py, line 19: KeyError: 1.0"),
@@ -105,6 +108,24 @@ def test_any_setting_of_any_scene_can_be_given():
     assert given["tank"] == (0.3, 0.2) and given["kernel"] == WendlandC4() and given["alpha"] == 0
     assert settings("--set", "wall_velocity=FreeSlip")["wall_velocity"].name == "FreeSlip"
     assert jax.config.jax_enable_x64 and settings()["dtype"] == "float64"
+
+
+@pytest.mark.parametrize(
+    "program, command",
+    [
+        ("jaxsph", "run"),
+        ("jaxsph", "sweep"),
+        ("jaxsph-rom", "run"),
+        ("jaxsph-rom", "train"),
+        ("jaxsph-rom", "labels"),
+    ],
+)
+def test_a_setting_of_a_taken_name_leaves_the_commands_option_alone(program, command):
+    words = [command, "my_scene.py:occupied"]
+    chosen = parser(program, words).chosen
+    settings = chosen.get_default("settings")
+    assert "speed" in settings.values() and "out" not in settings.values()
+    assert chosen._option_string_actions["--out"].dest == "out"
 
 
 def test_what_a_scene_can_be_given_is_told(capsys):

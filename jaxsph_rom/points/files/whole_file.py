@@ -102,16 +102,6 @@ def open_whole(path: str | os.PathLike, kind: tuple[str, int], made_by: str, ass
         ) from None
 
 
-def format_of(path: str | os.PathLike) -> str | None:
-    """The format that a file says it has, if it is one that can be read and says so."""
-    try:
-        with h5py.File(path, "r") as file:
-            found = file.attrs.get("format")
-    except OSError:
-        return None
-    return found if isinstance(found, str) else None
-
-
 def _check(path: Path, attributes: Mapping[str, Any], kind: tuple[str, int], made_by: str) -> None:
     if attributes.get("format") != kind[0]:
         raise FlowFileError(

@@ -18,11 +18,13 @@ def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
     told = json.loads((tmp_path / "trained.json").read_text())
     assert (told["modes"], told["labels"]) == (3, 128) and told["error"] < 0.05
     out, model = tmp_path / "out" / "labels-standing-wave", "out/labels-standing-wave/model.h5"
-    assert len(list((out / "full").rglob("*.h5"))) == 2
+    kept = {file: file.stat().st_mtime_ns for file in (out / "full").rglob("*.h5")}
+    assert len(kept) == 2
     (out / "model.h5").unlink()
     capsys.readouterr()
     assert main([*WAVE.split(), *TRAINED.split()]) == 0  # full runs are kept
     assert "error on its runs" in capsys.readouterr().out
+    assert kept == {file: file.stat().st_mtime_ns for file in (out / "full").rglob("*.h5")}
     at = ["--at", "amplitude=0.045,0.07", "reynolds=500"]
     assert main(["predict", model, *at, "--out", "waves", "--json", "waves.json"]) == 0
     printed = capsys.readouterr()
@@ -35,8 +37,33 @@ def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
     runs = [read_trajectory(tmp_path / m["file"]) for m in members]
     heights = [run.position[0, :, 1] - run.position[3, :, 1] for run in runs]
     assert np.abs(heights[1]).max() > np.abs(heights[0]).max() > 0.0
-    assert main(["predict", model, "--at", "amplitude=0.05", "reynolds=500", "--out", "waves"]) == 0
-    assert [f.name for f in sorted((tmp_path / "waves").glob("*.h5"))] == ["member-000.h5"]
+    assert main(["show", "waves/member-001.h5"]) == 0
+    assert "outside" in capsys.readouterr().out
+    (tmp_path / "waves" / "member-notes.h5").touch()  # of somebody else
+    lost = [model, "--at", "amplitude=0.05,5,1e30", "--reynolds", "500"]
+    for end in ([], ["--t-end", "4"]):
+        assert main(["predict", *lost, *end, "--out", "waves", "--json", "waves.json"]) == 0
+        members = json.loads((tmp_path / "waves.json").read_text())["members"]
+        assert [bool(m["fault"]) for m in members] == [False, True, True]
+        assert [bool(m["file"]) for m in members] == [True, False, False]
+        assert "no snapshot" in capsys.readouterr().out
+        files = [f.name for f in sorted((tmp_path / "waves").glob("*.h5"))]
+        assert files == ["member-000.h5", "member-notes.h5"]
+    assert main(["predict", *lost, "--fields"]) == 2
+    assert "--fields: is of models on points" in capsys.readouterr().err
+
+
+@pytest.mark.slow  # half a minute
+def test_from_samples_in_single_precision(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    few = ["--samples", "8", "--precision", "float32", "--out", "few.h5"]
+    assert main([*WAVE.split(), *TRAINED.split(), *few]) == 0
+    assert "particles followed" in capsys.readouterr().out
+    at = ["--at", "amplitude=0.045", "reynolds=500", "--json", "waves.json"]
+    assert main(["predict", "few.h5", *at]) == 0
+    (member,) = json.loads((tmp_path / "waves.json").read_text())["members"]
+    assert member["fault"] is None and member["samples_miss_particles_from"] is None
+    assert read_trajectory(tmp_path / member["file"]).position.dtype == np.float32
 
 
 @pytest.mark.parametrize(
@@ -45,6 +72,7 @@ def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
         (WAVE, "--train"),
         (f"{WAVE} --train depth=1", "has no depth"),
         (f"{WAVE} {TRAINED} --amplitude 0.02", "given as a setting too"),
+        (f"{WAVE} {TRAINED} --modes 200", "modes: 200 asked for, more than the"),
         (f"{WAVE} {TRAINED} --samples 500", "samples: 500 asked for, but there are 1 to 128"),
         (
             "labels standing-wave --resolution 16 --t-end 1 --train amplitude=0.03,0.06",

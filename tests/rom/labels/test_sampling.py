@@ -56,7 +56,6 @@ def test_samples_see_all_that_moves_them(sampled):
         assert float(jnp.abs(off).max()) < 1e-10 * largest
 
 
-@pytest.mark.slow  # its programs take seconds to compile
 def test_particles_that_samples_do_not_know_are_named(sampled):
     """In the run that it was trained on none comes near; one that is put near is seen."""
     prediction = sampled.predict({"amplitude": 0.05})
@@ -70,6 +69,7 @@ def test_particles_that_samples_do_not_know_are_named(sampled):
     np.testing.assert_array_equal(sampled.system.strayed(still, labels, space), [False, True])
 
 
+@pytest.mark.slow  # its programs take seconds to compile
 def test_rates_differentiate(sampled):
     """Along a direction, forward and backward, against central differences."""
     system, values = sampled.system, jnp.zeros(0)
