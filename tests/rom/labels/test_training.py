@@ -67,7 +67,7 @@ def test_a_file_holds_all_of_it(trained, tmp_path):
     np.testing.assert_array_equal(one.coordinates, other.coordinates)
     np.testing.assert_array_equal(one.fields().position, other.fields().position)
     (tmp_path / "none.h5").write_text("not a model")
-    with pytest.raises(FlowFileError, match="LabelModel.save"):
+    with pytest.raises(FlowFileError, match="jaxsph-rom labels"):
         load(tmp_path / "none.h5")
 
 
