@@ -190,6 +190,14 @@ REDUCED = {
     f"{TRAIN} --train 100 200 --out text/m.h5": "Not a directory",
     "train scenes.py:drop --train amplitude=0.1 --amplitude 0.2": "amplitude is given as a setting",
     "train scenes.py:drop --train ampiltude=0.1,0.2": "did you mean amplitude?",
+    # labels
+    "labels": "SCENE",
+    "labels standing-wave": "--train",
+    "labels standing-wave --train amplitude=x": "--train",
+    "labels standing-wave --train amplitude=0.03 --modes 0": "--modes: must be at least 1",
+    "labels standing-wave --train amplitude=0.03 --samples none": "--samples",
+    "labels standing-wave --resolution 16 --train depth=0.1": "has no depth",
+    "labels standing-wave --train amplitude=0.03 --out text/m.h5": "Not a directory",
     # predict
     "train scenes.py:drop --train amplitude=0:1:1000000000": "--train: at most 100000 values",
     "train scenes.py:drop --train amplitude=0:1:9999 resolution=1:99999:9999": "99980001",

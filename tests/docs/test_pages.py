@@ -26,6 +26,7 @@ SMALLER = {
     ("jaxsph", "sweep"): TINY,
     ("jaxsph-rom", "run"): f"{TINY} --train 100 200 --predict 150 --modes 2",
     ("jaxsph-rom", "train"): f"{TINY} --train 100 200 --modes 2 --closure-iterations 2",
+    ("jaxsph-rom", "labels"): "--resolution 16 --time-step 0.025 --modes 3",
 }
 # the same of a scene in a file that the page shows
 SMALLER_OWN = {

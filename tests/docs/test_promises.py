@@ -8,6 +8,7 @@ import pytest
 from jaxsph.cli.show_contents import file_format
 from jaxsph.io import trajectory_file
 from jaxsph.sweeps import sweep_file
+from jaxsph_rom.labels import label_model
 from jaxsph_rom.points.files import model_file, prediction_file
 from jaxsph_rom.report import json_report
 from tests.runs import random_run
@@ -35,6 +36,7 @@ def test_files_are_of_the_versions_that_the_page_says(tmp_path):
     modules = {"trajectory.h5": trajectory_file, "sweep.h5": sweep_file, "model.h5": model_file}
     for name, module in modules.items():
         assert VERSIONS[name] == [module.FORMAT, str(module.SCHEMA_VERSION)]
+    assert VERSIONS["model.h5` on labels"] == [str(part) for part in label_model.KIND]
     assert VERSIONS["prediction.h5"] == [str(part) for part in prediction_file.KIND]
     assert VERSIONS["report.json"][1] == str(json_report.SCHEMA_VERSION)
     assert file_format(random_run(tmp_path / "t.h5", count=2)) == VERSIONS["trajectory.h5"][0]
