@@ -80,7 +80,7 @@ def dam_break_3d(
     scheme = Consistent() if scheme is None else scheme
     wall_velocity = FreeSlip() if wall_velocity is None else wall_velocity
     positive(alpha=alpha, **{"t-end": end_time})
-    length, _, height = (TANK[0] - COLUMN[0], TANK[1], COLUMN[2])
+    front, height = TANK[0] - COLUMN[0], COLUMN[2]
     vessel = BoxRegion((0.0, 0.0, 0.0), TANK) & ~OBSTACLE
     effects = scheme.free_surface_effects(
         ArtificialViscosity(jnp.asarray(alpha, float)),
@@ -98,7 +98,7 @@ def dam_break_3d(
         reference_speed=3.0 * (GRAVITY * height) ** 0.5,
         mach=mach,
         side=TANK[0],
-        region=BoxRegion((length, 0.0, 0.0), (TANK[0], TANK[1], height)),
+        region=BoxRegion((front, 0.0, 0.0), (TANK[0], TANK[1], height)),
         walls=lambda space: Walls.around(
             vessel, space, parts=[WallPart("box", OBSTACLE, reference_length=0.161)]
         ),
