@@ -34,6 +34,9 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "START:STOP:COUNT; all combinations are run")  # fmt: skip
     add("--modes", type=positive_int, default=4, metavar="M",
         help="coordinates that have rates (default: %(default)s)")  # fmt: skip
+    add("--recovered", type=positive_int, default=12, metavar="R",
+        help="modes of motion and of density that fields are made of "
+        "(default: %(default)s)")  # fmt: skip
     add("--samples", type=positive_int, metavar="N",
         help="take rates of N particles as they move, by the full functional at each and at its "
         "neighbours (default: rates are learnt, as tensors)")  # fmt: skip
@@ -62,7 +65,10 @@ def _labels(options) -> int:
             for scene, named in zip(scenes, parameters, strict=True):
                 runs.append(full_run(folder / "full", scene, bar, said(named)))
                 check_run(scene, runs[-1], named)
-            trained = train(family, parameters, options.modes, runs=runs, sampling=sampling)
+            trained = train(
+                family, parameters, options.modes, runs=runs, recovered=options.recovered,
+                sampling=sampling,
+            )  # fmt: skip
         except SimulationError as error:
             return fail("jaxsph-rom", f"full model: {error}", 1)
         except KeyboardInterrupt:

@@ -59,7 +59,8 @@ def train(
     Raises:
         ValueError: if scenes differ in their particles' places or in what no reduced model can
             follow, runs are not those of the scenes, labels mix in one of them (it is named), no
-            system of so many modes stays bounded, or there can be no such samples.
+            system of so many modes or by these samples stays bounded on the runs, or there can be
+            no such samples.
         SimulationError: if a full run fails.
 
     Examples:
@@ -110,6 +111,11 @@ def train(
         models = [s.model() for s in scenes]
         system = sample(sampling, models, projected, place, motion, density, inputs, interval)
         told = {"members": len(system.labels), "error": error_on(system, projected, interval)}
+        if not np.isfinite(told["error"]):
+            raise ValueError(
+                "sampling: the model is lost on its own training runs; take fewer recovered modes, "
+                "more samples, or more runs."
+            )
     probed, known, starts = _probed(family, scenes, names, points, inputs, motion, modes)
     largest = np.abs(np.concatenate([p.coordinates for p in projected])).max(axis=0)
     told |= {
