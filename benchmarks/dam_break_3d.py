@@ -1,6 +1,6 @@
 """Water heights of a dam break that meets a box, beside the experiment's gauges.
 
-    python -m benchmarks.dam_break_3d --resolutions 110 129
+    python -m benchmarks.dam_break_3d --resolutions 110
 
 The gauges of Kleefsman et al. (2005) are `jaxsph.metrics.surface_height` a spacing wide: all the
 water above a place, spray included; the force on the box is not recorded here. The mean distance
@@ -40,7 +40,7 @@ def _arguments(add) -> None:
     add("--schemes", choices=tuple(SCHEMES), nargs="+", default=["consistent"],
         help="default: consistent")  # fmt: skip
     add("--h-over-dx", type=positive_float, default=1.3, metavar="X", help="default: 1.3")
-    add("--t-end", type=positive_float, default=3.0, metavar="T", help="default: 3 s")
+    add("--t-end", type=positive_float, default=1.2, metavar="T", help="default: 1.2 s")
 
 
 def _run(options) -> bool:

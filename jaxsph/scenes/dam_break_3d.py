@@ -40,7 +40,7 @@ def dam_break_3d(
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
-    end_time: float = 2.0,
+    end_time: float = 1.2,
     arrangement: Arrangement | None = None,
     kernel: Kernel | None = None,
     mach: float = 0.1,

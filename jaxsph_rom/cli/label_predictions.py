@@ -16,7 +16,7 @@ from jaxsph.io import check_target
 
 from ..labels import LabelModel, LabelPrediction, load
 from ..labels.label_model import KIND
-from .earlier_prediction import MEMBER, MOST_FILES, remove_earlier
+from .earlier_prediction import MEMBER, MOST_FILES, PREDICTION, remove_earlier
 from .options import MOST_BYTES, said, wanted_points, wanted_times
 
 LABELS = KIND[0]  # the format of their files
@@ -44,6 +44,7 @@ def predict_on_labels(options, folder: Path) -> int:
         prediction = model.predict(dict(zip(model.names, points.T, strict=True)), times=times)
         _warn(model, prediction)
         remove_earlier(folder)
+        (folder / PREDICTION).unlink(missing_ok=True)
         doubts = [_written(folder, prediction, k) for k in range(len(prediction))]
     results = _results(options, model, prediction, doubts, folder)
     write_json(options.json, {**results, **environment()})
