@@ -15,10 +15,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 from jaxsph import COMPILER_OPTIONS, Space, Trajectory
+from jaxsph.cloud import Cloud
 from jaxsph.scenes import Scene
 from jaxsph_rom.report.plain import plain
 
@@ -79,12 +79,8 @@ def alternate(
 
 def interacting_pairs(position, space: Space) -> int:
     """Ordered pairs i != j of particles within the kernel's support of one another."""
-    lengths = np.asarray(space.box.lengths)
-    position = np.asarray(position, np.float64) - np.asarray(space.box.lower)
-    periodic = np.asarray(space.box.periodic)
-    position = np.where(periodic, position % lengths, position)
-    tree = cKDTree(position, boxsize=np.where(periodic, lengths, 0.0))
-    return int(tree.count_neighbors(tree, space.support)) - len(position)
+    cloud = Cloud(position, space.box)
+    return int(cloud.count_around(cloud.positions, space.support).sum()) - len(position)
 
 
 def near_walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:

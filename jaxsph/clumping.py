@@ -7,8 +7,8 @@ from typing import final
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
+from .cloud import Cloud
 from .domain import Box
 from .pairs import Space
 from .trajectory import Snapshot
@@ -28,17 +28,7 @@ def nearest(position: Float[np.ndarray, "particles dim"], box: Box) -> float:
         >>> nearest(places, box)
         0.125
     """
-    sides = [
-        length if periodic else 0.0
-        for length, periodic in zip(box.lengths, box.periodic, strict=True)
-    ]
-    inside = np.asarray(position) - np.asarray(box.lower)
-    whole = np.where(sides, sides, 1.0)
-    wrapped = np.mod(inside, whole)  # a whole side for round-off below zero: no tree takes that
-    inside = np.where(sides, np.where(wrapped < whole, wrapped, 0.0), inside)
-    if len(inside) < 2:
-        return np.inf
-    return float(cKDTree(inside, boxsize=sides).query(inside, 2)[0][:, 1].min())
+    return float(Cloud(position, box).gaps().min(initial=np.inf))
 
 
 @final

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from jaxsph import Space, Trajectory
+from jaxsph.cloud import Cloud
 from jaxsph.metrics import kinetic_energy
 from jaxsph.scenes import Scene
 from jaxsph.scenes.hydrostatic_tank import GRAVITY, hydrostatic_pressure
@@ -131,26 +131,21 @@ def _each(function, scene: Scene, trajectory: Trajectory):
         yield function(scene.space, np.float64(trajectory.position[k]))
 
 
-def _tree(space: Space, position: Float[np.ndarray, "particles dim"]) -> cKDTree:
-    periodic, lengths = np.asarray(space.box.periodic), np.asarray(space.box.lengths)
-    position = position - np.asarray(space.box.lower)
-    position = np.where(periodic, position % lengths, position)
-    # the remainder of a tiny negative number is rounded to the length itself
-    position = np.where(periodic & (position >= lengths), 0.0, position)
-    return cKDTree(position, boxsize=np.where(periodic, lengths, 0.0))
-
-
 def _nearest(space: Space, position: np.ndarray) -> Float[np.ndarray, " particles"]:
     """Distances to nearest neighbours, in dx."""
-    tree = _tree(space, position)
-    return tree.query(tree.data, 2)[0][:, 1] / space.spacing
+    return Cloud(position, space.box).gaps() / space.spacing
 
 
 def _kernel_sums(space: Space, position: np.ndarray) -> Float[np.ndarray, " particles"]:
     """sum_j W_ij dx^n, itself included."""
-    tree = _tree(space, position)
-    pairs = tree.sparse_distance_matrix(tree, space.support, output_type="ndarray")
-    i, distance = pairs["i"], pairs["v"]  # a particle and itself are a pair too
-    dim = space.box.dim
-    values = np.asarray(space.kernel.value(jnp.asarray(distance), space.smoothing_length, dim))
-    return np.bincount(i, values, len(position)) * space.spacing**dim
+    pairs = Cloud(position, space.box).pairs(space.support)
+    apart = space.box.displacement(*(jnp.asarray(position[side]) for side in pairs.T))
+    distance = np.linalg.norm(np.asarray(apart), axis=1)
+    itself = np.zeros(1)
+    values = np.asarray(
+        space.kernel.value(
+            jnp.asarray(np.append(itself, distance)), space.smoothing_length, space.box.dim
+        )
+    )
+    each = sum(np.bincount(side, values[1:], len(position)) for side in pairs.T)
+    return (values[0] + each) * space.spacing**space.box.dim

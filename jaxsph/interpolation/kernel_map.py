@@ -45,7 +45,7 @@ class KernelMap(eqx.Module):
         """
         grid = CellGrid.with_width(space.box, space.support)
         mean = space.box.volume / space.spacing**space.box.dim / grid.cells
-        points_per_cell = grid.occupancy(points)
+        points_per_cell = int(grid.counts(points).max())
         bins = grid.bin(points, points_per_cell)
         return cls(points, bins, grid, space, points_per_cell, int(margin * mean) + 8)
 

@@ -98,23 +98,41 @@ class CellGrid:
         )
         return CellGrid(Box(lower, upper, periodic), shape, self.reach)
 
-    def depth(self, position: Float[Array, "points dim"]) -> int:
+    def counts(self, position: Float[Array, "points dim"]) -> Int[np.ndarray, " cells"]:
+        """How many points are in each cell (outside jit, to choose capacities)."""
+        return np.bincount(np.asarray(self.locate(position)), minlength=self.cells)
+
+    def longest_run(
+        self, here: Int[np.ndarray, " cells"], there: Int[np.ndarray, " cells"]
+    ) -> int:
+        """The most points `there` that a point `here` has in the cells around it that are in one
+        row, both given by their counts (outside jit)."""
+        n, reach = self.shape[-1], self.reach
+        there = there.reshape(-1, n)
+        if self.box.periodic[-1] and n <= 2 * reach:  # the run would meet itself
+            runs = np.repeat(there.sum(axis=1, keepdims=True), n, axis=1)
+        else:
+            mode = "wrap" if self.box.periodic[-1] else "constant"
+            beside = np.pad(there, ((0, 0), (reach, reach)), mode=mode)
+            before = np.pad(np.cumsum(beside, axis=1), ((0, 0), (1, 0)))
+            runs = before[:, 2 * reach + 1 :] - before[:, : -2 * reach - 1]
+        runs = np.concatenate([runs, np.zeros((1, n), runs.dtype)])  # outside the box
+        row, column = np.divmod(np.flatnonzero(here), n)
+        around = stencil(self.shape[:-1], self.box.periodic[:-1], reach)
+        return int(max(runs[beside, column].max(initial=0) for beside in around[row].T))
+
+    def depth(self, count: Int[np.ndarray, " cells"]) -> int:
         """The most points that lie, in the order of cells, between one and the first or the last in
-        the cells around all that follow or go before it (outside jit)."""
+        the cells around all that follow or go before it; points are given by their counts."""
         layer = math.prod(self.shape[1:])
         row = layer // self.shape[1]
         # of its own layer all where rows are met round the end, else a few rows
         own = layer if self.box.periodic[1] else min(layer, (self.reach + 1) * row)
         stretch = min(self.reach * layer + own, self.cells)
-        count = np.bincount(np.asarray(self.locate(position)), minlength=self.cells)
         if self.box.periodic[0]:
             count = np.concatenate([count, count[: stretch - 1]])
         before = np.concatenate([[0], np.cumsum(count)])
         return int(np.max(before[stretch:] - before[:-stretch]))
-
-    def occupancy(self, position: Float[Array, "points dim"]) -> int:
-        """The largest number of points in one cell (outside jit, to choose a capacity)."""
-        return int(np.bincount(np.asarray(self.locate(position)), minlength=self.cells).max())
 
     def sort(self, cell: Int[Array, " points"]):
         """Points in the order of their cells: their numbers, their cells, and where each begins.

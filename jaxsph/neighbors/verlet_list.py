@@ -12,6 +12,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from ..cloud import Cloud
 from ..devices import Devices
 from ..domain import Box
 from ..exchange import Exchange, least
@@ -21,6 +22,7 @@ from .rows_of_devices import RowsOfDevices
 
 CAPACITY_MARGIN = 1.15  # room in the list over its need at the start; every slot costs time
 RUN_MARGIN = 1.25  # the same for runs of cells
+_ASKED = 200_000  # particles counted one by one before a run, a second's work
 
 
 class VerletList(eqx.Module):
@@ -149,13 +151,14 @@ class NeighborSearch(eqx.Module):
         radius = support + skin
         check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
-        run_capacity = int(max(margin, RUN_MARGIN) * int(_longest_run(grid, position))) + 2
-        trial = cls(grid, support, skin, 1, run_capacity)
-        largest = int(_most_neighbors(trial, position))
+        count = grid.counts(position)
+        run_capacity = int(max(margin, RUN_MARGIN) * grid.longest_run(count, count)) + 2
+        largest = most_around(Cloud(position, box), position, radius) - 1  # itself is one
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
         longways = (_along(grid, axis) for axis in range(box.dim))
-        depths = (_rounded(margin * g.depth(position[:, columns])) for g, columns in longways)
+        count = count.reshape(grid.shape)
+        depths = (_rounded(margin * g.depth(count.transpose(axes).ravel())) for g, axes in longways)
         return cls(grid, support, skin, capacity, run_capacity, _Unread(depths))
 
     @property
@@ -190,12 +193,6 @@ class NeighborSearch(eqx.Module):
         """The list of all neighbours within support + skin of each, in jit or out of it."""
         return _built(self, position)
 
-    def _flag(self, position):
-        """Sorted points, a bit for each candidate of each: neighbour or not; and their most."""
-        points = Sorted.of(self.grid, position)
-        words = flags(self.grid, points, points, self.support + self.skin, self.run_capacity)
-        return points, words, jnp.max(count_bits(words))
-
 
 class _Unread(tuple):
     """Numbers that a single device does not read: programs that differ in them are the same."""
@@ -224,6 +221,13 @@ def _inverse(order: Int[Array, " particles"]) -> Int[Array, " particles"]:
     return jnp.zeros_like(order).at[order].set(places, unique_indices=True)
 
 
+def most_around(cloud: Cloud, places: Float[Array, "places dim"], radius: float) -> int:
+    """The most points of a cloud within a radius of a place; of many places some are asked, as a
+    list that proves too short is made anew with more room."""
+    asked = np.asarray(places)[:: 1 + len(places) // _ASKED]
+    return int(cloud.count_around(asked, radius).max(initial=0))
+
+
 def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
     """A ValueError if a particle could meet another across two faces of a periodic box."""
     radius = support + skin
@@ -241,7 +245,9 @@ def _built(search: NeighborSearch, position) -> VerletList:
     position = lax.stop_gradient(position)
     grid, room = search.grid, (search.run_capacity, search.capacity)
     if search.devices is None:
-        points, words, largest = search._flag(position)
+        points = Sorted.of(grid, position)
+        words = flags(grid, points, points, search.support + search.skin, search.run_capacity)
+        largest = jnp.max(count_bits(words))
         longest = longest_run(grid, points, points)
         places = jnp.arange(points.count, dtype=jnp.int32)
         index = pick(words, grid, points, points, *room)
@@ -265,14 +271,3 @@ def _built(search: NeighborSearch, position) -> VerletList:
         cell_overflow=(longest > search.run_capacity).astype(jnp.int32),
         exchange=exchange,
     )
-
-
-@eqx.filter_jit  # compiled once for scenes alike
-def _most_neighbors(search: NeighborSearch, position):
-    return search._flag(position)[2]
-
-
-@eqx.filter_jit
-def _longest_run(grid: CellGrid, position):
-    points = Sorted.of(grid, position)
-    return longest_run(grid, points, points)

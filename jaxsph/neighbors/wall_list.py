@@ -11,15 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
-from scipy.spatial import cKDTree
 
+from ..cloud import Cloud
 from ..devices import Devices
 from ..domain import Box
 from ..exchange import Exchange, Gathered
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 from .rows_of_devices import RowsOfDevices
-from .verlet_list import CAPACITY_MARGIN, RUN_MARGIN, NeighborSearch, VerletList
+from .verlet_list import CAPACITY_MARGIN, RUN_MARGIN, NeighborSearch, VerletList, most_around
 
 _FILLED = 0.7  # share of the places near walls that a vessel full of fluid takes, at least
 
@@ -198,7 +198,8 @@ class WalledSearch(eqx.Module):
         fluid = NeighborSearch.allocate(position, box, support, skin, margin)
         radius = support + skin
         reach_grid = CellGrid.with_width(box, 0.5 * spacing, reach=0)
-        distance = _distance_to_nearest(reach_grid.centers, np.asarray(ghosts), box)
+        of_walls = Cloud(ghosts, box)
+        distance = of_walls.nearest(reach_grid.centers)[0]
         half_diagonal = 0.5 * math.hypot(*reach_grid.widths)
         within_reach = jnp.asarray(distance < radius + half_diagonal)
         wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
@@ -213,23 +214,25 @@ class WalledSearch(eqx.Module):
             1,
             1,
         )
-        near_run, ghost_run = map(int, _longest_runs(whole, position))
+        near = np.asarray(whole._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
+        free = near & (distance > 0.72 * spacing)  # between ghosts is no room
+        room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
+        near = position[np.asarray(whole._may_see(position))]
+        count = room if len(near) < _FILLED * room else len(near)  # fluid may flow there yet
+        of_fluid, of_ghosts = wall_grid.counts(near), wall_grid.counts(ghosts)
+        near_run = wall_grid.longest_run(of_ghosts, of_fluid)
+        ghost_run = wall_grid.longest_run(of_fluid, of_ghosts)
         more = max(margin, RUN_MARGIN) if moving else 1.0
-        trial = replace(
+        largest = max(
+            most_around(of_walls, near, radius), most_around(Cloud(near, box), ghosts, radius)
+        )
+        return replace(
             whole,
-            near_capacity=1,
+            near_capacity=min(position.shape[0], int(np.ceil(margin * count)) + 1),
+            capacity=max(8, int(np.ceil(margin * largest))),
             near_run_capacity=int(max(margin, RUN_MARGIN) * near_run) + 2,
             ghost_run_capacity=max(1, math.ceil(more * ghost_run) + (2 if moving else 0)),
         )
-        near = np.asarray(trial._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
-        free = near & (distance > 0.72 * spacing)  # between ghosts is no room
-        room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
-        count = int(trial._may_see(position).sum())
-        count = room if count < _FILLED * room else count  # fluid may flow there yet
-        most = min(position.shape[0], int(np.ceil(margin * count)) + 1)
-        trial = replace(trial, near_capacity=most)
-        largest = int(_most_ghosts(trial, position))
-        return replace(trial, capacity=max(8, int(np.ceil(margin * largest))))
 
     @property
     def skin(self) -> float:
@@ -308,7 +311,7 @@ class WalledSearch(eqx.Module):
             largest = jnp.maximum(largest, jnp.max(count_bits(words)))
             overflow = overflow | (longest_run(grid, points, others) > room)
             sides.append(words)
-        return here, ghosts, sides, (overflow | (largest > self.capacity), largest)
+        return here, ghosts, sides, overflow | (largest > self.capacity)
 
 
 def _around(box: Box, margin: float) -> Box:
@@ -320,23 +323,6 @@ def _around(box: Box, margin: float) -> Box:
     )
 
 
-def _distance_to_nearest(points: np.ndarray, others: np.ndarray, box: Box) -> np.ndarray:
-    """Distance [m] of each point to the nearest of the others, across periodic faces too."""
-    # the tree wraps coordinates into [0, length); a length of 0 says that a direction is closed
-    period = [length if p else 0.0 for length, p in zip(box.lengths, box.periodic, strict=True)]
-    lower = np.where(box.periodic, box.lower, 0.0)
-    wrap = np.asarray([length if length else np.inf for length in period])
-    tree = cKDTree(_wrapped(others - lower, wrap), boxsize=period)
-    return tree.query(_wrapped(points - lower, wrap))[0]
-
-
-def _wrapped(points: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    closed = np.isinf(lengths)
-    safe = np.where(closed, 1.0, lengths)
-    wrapped = np.where(closed, points, np.mod(points, safe))
-    return np.where(~closed & (wrapped >= safe), 0.0, wrapped)  # mod may round up to the length
-
-
 @partial(eqx.filter_jit, inline=True)
 def _built(search: WalledSearch, position) -> WallList:
     position = lax.stop_gradient(position)
@@ -346,7 +332,7 @@ def _built(search: WalledSearch, position) -> WallList:
         position = search.devices.whole(position)[fluid.order]
         pairs, overflow = _shared_pairs(search, position)
         return WallList(fluid, pairs, overflow, built_at)
-    here, ghosts, (seen, seeing), (overflow, _) = search._flag(fluid.sort(position))
+    here, ghosts, (seen, seeing), overflow = search._flag(fluid.sort(position))
     grid, near, count = search.wall_grid, here.order, here.count
     to_ghosts, to_fluid = search.ghost_run_capacity, search.near_run_capacity
     index = jnp.concatenate([
@@ -374,16 +360,3 @@ def _shared_pairs(search: WalledSearch, position) -> tuple[WallPairs, Bool[Array
     near = devices.whole(devices.filled(here.order, count))  # read in every pass
     number = devices.filled(ghosts.order, ghosts.order[-1])
     return WallPairs(devices.beside(*sides), near, number, exchange), overflow
-
-
-@eqx.filter_jit  # compiled once for scenes alike
-def _most_ghosts(search: WalledSearch, position):
-    return search._flag(position)[-1][1]
-
-
-@eqx.filter_jit
-def _longest_runs(search: WalledSearch, position):
-    """Of particles, as ghosts see them, and of ghosts, as particles do."""
-    here, ghosts, _ = search._sorted(position)
-    grid = search.wall_grid
-    return longest_run(grid, ghosts, here), longest_run(grid, here, ghosts)

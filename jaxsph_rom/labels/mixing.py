@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from jaxsph import Space, Trajectory
+from jaxsph.cloud import Cloud
 
 _NEAR = 1.5  # times dx: the eight around a particle on a square lattice
 MIXED = 0.02  # of all pairs
@@ -28,10 +28,7 @@ def parted_share(trajectory: Trajectory, space: Space) -> Float[np.ndarray, " ti
     box = space.box
     start, lengths = trajectory.position[0], np.asarray(box.lengths)
     periodic = np.asarray(box.periodic)
-    inside = np.where(periodic, (start - np.asarray(box.lower)) % lengths, start)
-    # a tree wraps a direction around a length, and none around zero
-    tree = cKDTree(inside, boxsize=np.where(periodic, lengths, 0.0))
-    first, second = tree.query_pairs(_NEAR * space.spacing, output_type="ndarray").T
+    first, second = Cloud(start, box).pairs(_NEAR * space.spacing).T
     apart = trajectory.position[:, second] - trajectory.position[:, first]
     apart -= np.where(periodic, lengths * np.round(apart / lengths), 0.0)
     return (np.sum(apart**2, axis=2) > space.support**2).mean(axis=1)

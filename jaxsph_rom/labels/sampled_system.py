@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from scipy.spatial import cKDTree
 
 from jaxsph import ParticleState
+from jaxsph.cloud import Cloud
 from jaxsph.neighbors import VerletList, WallList
 
 from .inputs import Inputs
@@ -73,14 +74,11 @@ class SampledSystem(LabelSystem):
         """When a particle is within the kernel's support of a sample that is not followed: it is
         missing in the sample's rates."""
         _, members = cKDTree(labels).query(np.asarray(self.labels))
-        samples, box = members[: self.gather.shape[1]], space.box
-        lengths, periodic = np.asarray(box.lengths), np.asarray(box.periodic)
+        samples = members[: self.gather.shape[1]]
         found = np.zeros(len(position), bool)
         for k, place in enumerate(np.asarray(position, float)):
-            inside = np.where(periodic, (place - np.asarray(box.lower)) % lengths, place)
-            tree = cKDTree(inside, boxsize=np.where(periodic, lengths, 0.0))
-            near = tree.query_ball_point(inside[samples], space.support)
-            found[k] = len(np.setdiff1d(np.concatenate(near), members)) > 0
+            near = Cloud(place, space.box).around(place[samples], space.support)
+            found[k] = len(np.setdiff1d(near, members)) > 0
         return found
 
 

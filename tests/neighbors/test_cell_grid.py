@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxsph import Box, CellGrid
+from tests.neighbors.longest_run import longest_run
 
 CLOSED, PERIODIC = False, True
 GRIDS = [
@@ -120,14 +121,14 @@ def test_bins_hold_every_particle_once(grid, seed):
 def test_all_particles_in_one_cell_leave_the_others_empty(grid):
     x = jnp.broadcast_to(jnp.asarray(grid.centers[-1]), (7, grid.box.dim))
     check_bins(grid, x, binned(grid, x, 7), 7)
-    assert grid.occupancy(x) == 7
+    assert grid.counts(x).max() == 7
 
 
 @each_grid
 def test_one_particle(grid):
     x = jnp.asarray(grid.centers[:1])
     check_bins(grid, x, binned(grid, x, 1), 1)
-    assert grid.occupancy(x) == 1
+    assert grid.counts(x).max() == 1
 
 
 @each_grid
@@ -135,7 +136,7 @@ def test_one_particle(grid):
 @given(seed=st.integers(0, 2**32 - 1), capacity=st.sampled_from([1, 3, 12, 60]))
 def test_a_cell_that_is_too_full_is_flagged(grid, seed, capacity):
     x = uniform_points(grid, seed)
-    fullest = grid.occupancy(x)
+    fullest = int(grid.counts(x).max())
     assert fullest == np.bincount(np.asarray(grid.locate(x))).max()
     assert bool(binned(grid, x, capacity).overflow) == (fullest > capacity)
 
@@ -143,7 +144,7 @@ def test_a_cell_that_is_too_full_is_flagged(grid, seed, capacity):
 def test_the_fullest_cell_may_be_exactly_full():
     grid = GRIDS[0]
     x = uniform_points(grid, 5)
-    fullest = grid.occupancy(x)
+    fullest = int(grid.counts(x).max())
     check_bins(grid, x, binned(grid, x, fullest), fullest)
     assert binned(grid, x, fullest - 1).overflow
 
@@ -155,3 +156,13 @@ def test_width_is_a_lower_bound_and_the_finest(width):
     for length, got, n in zip(box.lengths, grid.widths, grid.shape, strict=True):
         assert got >= width * (1.0 - 1e-12) or n == 1  # round-off of the division
         assert length / (n + 1) < width * (1.0 + 1e-12)
+
+
+@each_grid
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1), few=st.sampled_from([0, 1, 5, 40]))
+def test_the_longest_run_is_counted_as_one_by_one(grid, seed, few):
+    here, there = uniform_points(grid, seed, few), uniform_points(grid, seed + 1, 50)
+    counts = grid.counts(here), grid.counts(there)
+    assert grid.longest_run(*counts) == longest_run(grid, here, there)
+    assert grid.longest_run(*counts[::-1]) == longest_run(grid, there, here)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from benchmarks.dam_break_3d import compared
 from benchmarks.references.dam_break_3d import ARRIVAL, HEIGHT, TIME
@@ -44,8 +45,26 @@ def test_the_judge_is_zero_on_the_experiment_itself():
 
 
 @pytest.mark.slow
+def test_its_sides_are_mirror_images():
+    """Judged early: round-off grows tenfold every 0.02 s once water shoots ahead, 2e-13 spacings
+    at 0.06 s, 1e-11 at 0.1 s, 1e-10 at 0.12 s; at 0.3 s the water's height differs by 7e-5."""
+    scene = dam_break_3d(end_time=0.1)
+    start = np.asarray(scene.state.position)
+    other = cKDTree(start).query(mirrored(start))[1]
+    ghosts = np.asarray(scene.walls.position)
+    assert cKDTree(ghosts).query(mirrored(ghosts))[0].max() < 1e-15
+    run = run_scene(scene)
+    for place in run.position:
+        np.testing.assert_allclose(mirrored(place[other]), place, rtol=0.0, atol=1e-9 * scene.space.spacing)
+
+
+def mirrored(place):
+    return place * [1.0, -1.0, 1.0] + [0.0, TANK[1], 0.0]
+
+
+@pytest.mark.slow
 def test_its_front_runs_as_the_experiments_did():
-    """To the first gauge; symmetric about the middle, and no water leaves."""
+    """To the first gauge, and no water leaves."""
     scene = dam_break_3d(end_time=0.3)
     run = run_scene(scene)
     found = compared(
@@ -56,8 +75,4 @@ def test_its_front_runs_as_the_experiments_did():
     assert found["H4_off_percent"] < 3.0  # 2.6 measured; the start is 1.7 percent too high
     last = run.position[-1]
     assert (last > 0.0).all() and (last < np.asarray(TANK)).all()
-    ours, mirrored = (
-        surface_height(run, scene, (2.0, side), 0.05)[-1] for side in (0.25, 0.75)
-    )
-    assert ours == pytest.approx(mirrored, rel=1e-6)
     np.testing.assert_allclose(run.mean_forces["box"], 0.0, atol=1e-9)  # not there yet

@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxsph import ParticleState, SPHFunctional, VerletList, WallList
+from jaxsph.cloud import Cloud
 from jaxsph.scenes import Scene
 
 from ...field_advection import FieldAdvection
-from .cloud import Cloud
 from .coefficients import Coefficients
 from .fixed_points import on_points, with_effects
 from .log_density import from_log_density

@@ -9,8 +9,7 @@ import scipy.sparse
 from jaxtyping import Float
 
 from jaxsph import Box
-
-from .cloud import Cloud
+from jaxsph.cloud import Cloud
 
 
 def local_matrix(

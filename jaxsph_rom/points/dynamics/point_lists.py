@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxsph import SPHFunctional, VerletList, WallList
+from jaxsph.cloud import Cloud
 from jaxsph.neighbors import WallPairs, check_periodic
-
-from .cloud import Cloud
 
 
 def neighbors_at(
