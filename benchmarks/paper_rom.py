@@ -4,8 +4,9 @@
 
 Its three experiments with its options: Galerkin (its GPOD) and adjoint Petrov-Galerkin projection
 with its memory length, its advection, Euclidean inner product, no centring. What is run is listed
-in `references/source_paper.py`. Runs are kept in a folder and finished cases in the JSON file, so
-that all can be made in parts: the same command goes on.
+in `references/source_paper.py`. With `--points` models on points, whose online cost is that of
+tensors, learn from the same full runs. Runs are kept in a folder and finished cases in the JSON
+file, so that all can be made in parts: the same command goes on.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from jaxsph_rom import (
     cumulative_energy,
 )
 from jaxsph_rom.cli import PRODUCTS
-from jaxsph_rom.study import PLANS, Outcome, Plan
+from jaxsph_rom.study import PLANS, Method, OnPoints, Outcome, Plan
 
 from .measure import (
     Clocked,
@@ -52,6 +53,7 @@ from .measure import (
 from .references.source_paper import EXPERIMENTS, PROJECTIONS, Kind, PaperExperiment, Wanted
 from .table import Table, command
 
+POINTS = ("points",)  # stands for the projection of models that are not the paper's
 _KEY = ("kind", "reynolds", "modes", "projection", "inner_product")
 
 
@@ -63,7 +65,7 @@ def main(argv: list[str] | None = None) -> int:
 def _run(options) -> None:
     paper = EXPERIMENTS[options.scene]
     kinds = _kinds(paper, options)
-    wanted = _wanted(paper.wanted(kinds), options)
+    wanted = _wanted(paper.wanted(kinds, POINTS if options.points else PROJECTIONS), options)
     kept = Table(options.json, _KEY, settings=_settings(options), rows="cases")
     kept.results.setdefault("cumulative_energy_percent", {})
     if any(case["scene"] != options.scene for case in kept.rows):
@@ -88,6 +90,7 @@ def _arguments(add) -> None:
         "(default: all)")  # fmt: skip
     add("--inner-product", choices=tuple(PRODUCTS), default="euclidean",
         help="of POD and projection (default: %(default)s, the paper's)")  # fmt: skip
+    add("--points", action="store_true", help="models on points instead, with the energy product")
     add("--out", type=Path, metavar="DIR",
         help="where runs are kept (default: out/paper-rom-SCENE-SCALE)")  # fmt: skip
     add("--resolution", type=positive_int, metavar="N", help="instead of the scale's")
@@ -144,30 +147,32 @@ def _settings(options) -> dict[str, Any]:
 
 def _run_kind(kept: Table, options, kind: Kind, wanted: list[Wanted]) -> None:
     """Run what is not done yet of one kind, and write the file after each case."""
-    name = wanted[0].kind
+    name, product = wanted[0].kind, "energy" if options.points else options.inner_product
     keys = {
-        case: (case.kind, case.reynolds, case.modes, case.projection, options.inner_product)
-        for case in wanted
+        case: (case.kind, case.reynolds, case.modes, case.projection, product) for case in wanted
     }
     left = [case for case in wanted if not kept.has(keys[case])]
     for case in wanted:
         if case not in left:
             tell(f"done before: {case.name}")
     energy = kept.results["cumulative_energy_percent"]
-    listed = name == "reconstructive" and options.inner_product not in energy
+    listed = name == "reconstructive" and not options.points and product not in energy
     if not left and not listed:
         return
     clocked = Clocked()
     plan = dataclasses.replace(PLANS[options.scene], borders=kind.borders)
-    study = _study(options, plan, clocked, ())
+    study = _study(options, plan, clocked, _faithful(options))
     kept.results |= _scene_record(study, kind.trained_on[0]) | {"environment": environment()}
     for reynolds, modes, projections in _products(left):
-        wanted = tuple(_projection(projection, plan.tau) for projection in projections)
-        study = _study(options, plan, clocked, wanted)
+        wanted = (_projection(projection, plan.tau) for projection in projections)
+        method = OnPoints() if options.points else _faithful(options, *wanted)
+        study = _study(options, plan, clocked, method)
         asked = dataclasses.replace(plan, train=kind.trained_on, predict=reynolds, modes=modes)
         for experiment in asked.experiments():
             for outcome in study.run(experiment):
                 case = _record(options.scene, name, outcome, clocked.take())
+                if options.points:
+                    case["projection"] = "points"
                 kept.rows.append(case)
                 kept.rows.sort(key=_place)
                 kept.write()
@@ -175,18 +180,24 @@ def _run_kind(kept: Table, options, kind: Kind, wanted: list[Wanted]) -> None:
     if listed:
         paper = EXPERIMENTS[options.scene].energy
         experiment = Experiment(kind.trained_on, (), ())
-        energy[options.inner_product] = _energies(study, experiment, paper)
+        energy[product] = _energies(study, experiment, paper)
         kept.write()
 
 
 def _place(case: dict[str, Any]) -> tuple:
     """Where a case stands in the table."""
     kinds = list(EXPERIMENTS[case["scene"]].kinds)
-    kind, projection = kinds.index(case["kind"]), PROJECTIONS.index(case["projection"])
+    kind = kinds.index(case["kind"])
+    projection = (*PROJECTIONS, *POINTS).index(case["projection"])
     return case["inner_product"], kind, case["reynolds"], case["modes"], projection
 
 
-def _study(options, plan: Plan, clocked: Clocked, projections) -> Study:
+def _faithful(options, *projections) -> Method:
+    product = PRODUCTS[options.inner_product]()
+    return dataclasses.replace(FAITHFUL, projections=projections, product=product)
+
+
+def _study(options, plan: Plan, clocked: Clocked, method: Method) -> Study:
     folder = options.out or Path("out", f"paper-rom-{options.scene}-{options.scale}")
     settings = _settings(options)
     make = partial(
@@ -204,9 +215,7 @@ def _study(options, plan: Plan, clocked: Clocked, projections) -> Study:
     return Study(
         lambda reynolds: scene(reynolds=reynolds),
         folder,
-        dataclasses.replace(
-            FAITHFUL, projections=projections, product=PRODUCTS[options.inner_product]()
-        ),
+        method,
         progress=clocked.progress,
         probes=plan.probes,
         judged_from=plan.judged_from,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from .effects import Effect
@@ -72,10 +73,18 @@ class FullModel(Model):
         return search, speed * time_step
 
     def begin(self, state):
-        neighbors = self.prepare(state)
         if self.search.devices is None:
-            return state, neighbors
+            return state, self._outdated(state)
+        neighbors = self.prepare(state)
         return _arranged(state, neighbors.sort), neighbors.in_place()
+
+    def _outdated(self, state):
+        """A list that the first step makes anew: programs that step hold its making once."""
+        like = jax.eval_shape(self.prepare, state)
+        empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), like)
+        away = 0.5 * np.asarray(self.search.box.lengths)  # farther than any particle may go
+        away = lax.stop_gradient(state.position) + away.astype(state.position.dtype)[None]
+        return eqx.tree_at(lambda neighbors: neighbors.reference, empty, away)
 
     def keep_up(self, state, auxiliary, time_step):
         if self.search.devices is None:

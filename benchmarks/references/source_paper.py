@@ -73,12 +73,12 @@ class PaperExperiment:
     at_scale: dict[str, dict[str, Kind]] = field(default_factory=dict)
     arrangement: str = "lattice"
 
-    def wanted(self, kinds: dict[str, Kind]) -> list[Wanted]:
+    def wanted(self, kinds: dict[str, Kind], projections=PROJECTIONS) -> list[Wanted]:
         """All runs of some kinds."""
         return [
             Wanted(name, *values)
             for name, kind in kinds.items()
-            for values in product(kind.reynolds, kind.modes, PROJECTIONS)
+            for values in product(kind.reynolds, kind.modes, projections)
         ]
 
 

@@ -104,6 +104,16 @@ def test_reduced_models_are_taken_up_again(tmp_path, capsys):
     assert "done before: reconstructive-100-2-galerkin" in captured.err
     assert "cumulative energy" in captured.out
     assert results(path)["cases"] == [case]
+    points = [word.replace("galerkin", "points") for word in same]
+    assert paper_rom.main([*points, "--modes", "2", "--points"]) == 0
+    on_points, first = results(path)["cases"]
+    assert first == case and on_points["projection"] == "points"
+    assert on_points["inner_product"] == "energy" and on_points["hyper"].startswith("tensor")
+    assert 0 < on_points["velocity_peak_percent"] < 100
+    assert list(results(path)["cumulative_energy_percent"]) == ["euclidean"]
+    capsys.readouterr()
+    assert paper_rom.main([*points, "--modes", "2", "--points"]) == 0
+    assert "done before: reconstructive-100-2-points" in capsys.readouterr().err
     assert paper_rom.main([*same, "--end-time", "0.2"]) == 2
     assert "other settings" in capsys.readouterr().err
 
