@@ -4,16 +4,18 @@
     python -m benchmarks.particle_modes --scene lid-driven-cavity --train 100 --reynolds 100
 
 The Taylor-Green vortex at a Reynolds number that nothing was trained on, from a lattice or packed
-particles, or the lid-driven cavity, in either scheme, by either projection. Errors are those over
-the reference points, the pressure's mean and what is left of it apart, and on the centre line; a
-run that was named as it went, whose pressure is off by its own range, or whose particles clump, is
-named. Beside them stand the floors, which is what the modes make of the full run, the full model's
-own sound, which is its pressure less its low-pass, and the errors of low-passed pressures. Runs are
-kept in a folder and finished rows in the JSON file: the same command goes on.
+particles, the lid-driven cavity, or the open one once it has settled, in either scheme, by either
+projection. Errors are those over the reference points, the pressure's mean and what is left of it
+apart, and on the line of probes; a run that was named as it went, whose pressure is off by its own
+range, or whose particles clump, is named. Beside them stand the floors, which is what the modes
+make of the full run, the full model's own sound, which is its pressure less its low-pass, and the
+errors of low-passed pressures. Runs are kept in a folder and finished rows in the JSON file: the
+same command goes on.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,7 @@ from jaxsph.metrics import relative_discrepancy
 from jaxsph.scenes import SCENES
 from jaxsph.schemes import SCHEMES
 from jaxsph_rom import Experiment, OnParticles, Study, low_pass
-from jaxsph_rom.study import doubt, level_and_fluctuation
+from jaxsph_rom.study import PLANS, doubt, level_and_fluctuation
 
 from .measure import format_rows, number, progress
 from .particle_models import INTERPOLATIONS, PROJECTIONS
@@ -46,8 +48,8 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _arguments(add) -> None:
-    add("--scene", choices=("taylor-green", "lid-driven-cavity"), default="taylor-green",
-        help="default: %(default)s")  # fmt: skip
+    add("--scene", choices=("taylor-green", "lid-driven-cavity", "open-cavity"),
+        default="taylor-green", help="default: %(default)s")  # fmt: skip
     add("--interpolation", choices=tuple(INTERPOLATIONS),
         help="of modes at moving particles (default: polynomials on a lattice, else splines)")
     add("--cutoff", type=positive_float, metavar="HZ",
@@ -96,22 +98,25 @@ def _run(options) -> None:
 def _study(options, scheme: str, arrangement: str, interpolation: str, name: str) -> Study:
     folder = options.out or Path("out", f"particle-modes-{options.scene}-{options.resolution}")
 
-    def make(reynolds: float):
-        return SCENES[options.scene](
-            options.resolution,
-            reynolds,
-            end_time=options.end_time,
-            arrangement=ARRANGEMENTS[arrangement](seed=0),
-            scheme=SCHEMES[scheme],
-            dtype="float64",
-        )
-
+    folder, plan = folder / f"{scheme}-{arrangement}", PLANS[options.scene]
+    make = partial(
+        SCENES[options.scene],
+        resolution=options.resolution,
+        end_time=options.end_time,
+        arrangement=ARRANGEMENTS[arrangement](seed=0),
+        scheme=SCHEMES[scheme],
+        dtype="float64",
+    )
+    scene = plan.scenes(make, folder, progress)
     method = OnParticles((PROJECTIONS[name],), interpolation=INTERPOLATIONS[interpolation])
-    return Study(make, folder / f"{scheme}-{arrangement}", method, progress=progress)
+    return Study(
+        lambda reynolds: scene(reynolds=reynolds), folder, method,
+        progress=progress, probes=plan.probes,
+    )  # fmt: skip
 
 
 class _Truth:
-    """The full run on the reference points and on the centre line."""
+    """The full run on the reference points and on the line of probes."""
 
     def __init__(self, study: Study, experiment: Experiment, options):
         (reynolds,) = experiment.reynolds

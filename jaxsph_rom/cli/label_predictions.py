@@ -8,7 +8,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from jaxsph.cli import print_rows
+from jaxsph.cli import fail, print_rows
 from jaxsph.cli.options import write_json
 from jaxsph.environment import environment
 from jaxsph.integrate import explanation
@@ -18,6 +18,7 @@ from ..labels import LabelModel, LabelPrediction, load
 from ..labels.label_model import KIND
 from .earlier_prediction import MEMBER, MOST_FILES, PREDICTION, remove_earlier
 from .options import MOST_BYTES, said, wanted_points, wanted_times
+from .predicted import none_left
 
 LABELS = KIND[0]  # the format of their files
 _DOUBTS = {
@@ -49,7 +50,8 @@ def predict_on_labels(options, folder: Path) -> int:
     results = _results(options, model, prediction, doubts, folder)
     write_json(options.json, {**results, **environment()})
     _print(results, model, prediction)
-    return 0
+    lost = none_left(prediction.status)
+    return fail("jaxsph-rom", lost, 1) if lost else 0
 
 
 def _check(model: LabelModel, count: int, times) -> None:

@@ -28,7 +28,7 @@ from ..points.files.member_files import write_fields, write_tracers
 from .earlier_prediction import MEMBER, MOST_FILES, PREDICTION, remove_earlier
 from .label_predictions import LABELS, predict_on_labels
 from .options import MOST_BYTES, bar, named_numbers, said, wanted_points, wanted_times
-from .predicted import print_prediction, results_of, write_report
+from .predicted import none_left, print_prediction, results_of, write_report
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
@@ -87,6 +87,7 @@ def _predict(options) -> int:
     page = write_report(folder, results, trained, prediction, repeating(options))
     print_prediction(results, trained, prediction)
     print(f"\nreport: {page}, {page.with_suffix('.json')}")
+    lost = none_left(prediction.status) or lost
     return fail("jaxsph-rom", lost, 1) if lost else 0
 
 

@@ -23,6 +23,14 @@ _FAULTS_KEPT = 100
 _FAULTS_SHOWN = 5
 
 
+def none_left(status: np.ndarray) -> str:
+    """What to say where every member of a prediction is lost; else nothing."""
+    if not status.all():
+        return ""
+    count = "the one member is" if len(status) == 1 else f"all {len(status)} members are"
+    return f"{count} lost: {explanation(status[0])}."
+
+
 def results_of(
     trained: TrainedModel, prediction: Prediction, model: Path, path: Path
 ) -> dict[str, Any]:
