@@ -29,6 +29,66 @@ def scheme_models() -> str:
     return markdown(header, lines())
 
 
+def _beside_the_paper(scale: str) -> str:
+    """Models of the vortex at a size, and what the paper prints of its own."""
+    header = ("Re", "", "M", "projection", "velocity %", "paper", "pressure %: peak, median",
+              "paper", "full [s]", "reduced")  # fmt: skip
+    notes = {"pressure below 10": "below 10", "velocity 7 to 8, pressure unstable": "unstable"}
+    rows = sorted(
+        results(f"taylor_green_{scale}", "cases"),
+        key=lambda row: (row["kind"] == "predictive", row["reynolds"], row["modes"]),
+    )
+    return markdown(
+        header,
+        (
+            (
+                f"{row['reynolds']:g}",
+                {"reconstructive": "reconstructed", "predictive": "predicted"}[row["kind"]],
+                str(row["modes"]),
+                {"points": "none: on points"}.get(row["projection"], row["projection"]),
+                short(row["velocity_peak_percent"]),
+                short(row["paper_velocity_peak_percent"]),
+                f"{short(row['pressure_peak_percent'], 3)}, "
+                f"{short(row['pressure_median_percent'], 3)}",
+                notes.get(row["paper_note"], short(row["paper_pressure_peak_percent"])),
+                short(row["fom_seconds"], 3),
+                duration(row["rom_seconds"]),
+            )
+            for row in rows
+        ),
+    )
+
+
+def paper_small() -> str:
+    """Of 50 x 50 particles, h = 2 dx."""
+    return _beside_the_paper("small")
+
+
+def paper_half() -> str:
+    """Of 150 x 150 particles, h = 4 dx."""
+    return _beside_the_paper("half")
+
+
+def paper_size() -> str:
+    """Of 300 x 300 particles, h = 4 dx, the paper's."""
+    return _beside_the_paper("paper")
+
+
+def paper_energy() -> str:
+    """What the first modes hold of the snapshots of 300 x 300 particles, and of the paper's."""
+    path = ROOT / "benchmarks" / "results" / "taylor_green_paper.json"
+    found = json.loads(path.read_text(encoding="utf-8"))["cumulative_energy_percent"]["euclidean"]
+    spaces = {"lagrangian": "labels", "reference": "points"}
+    return markdown(
+        ("fields on", "M", "cumulative energy %", "paper"),
+        (
+            (title, modes, short(found[space][modes], 6), short(printed, 6))
+            for space, title in spaces.items()
+            for modes, printed in found["paper"][space].items()
+        ),
+    )
+
+
 def _particles(scene: str, size: int, timed: bool) -> str:
     """Models on moving particles at several numbers of modes."""
     header = ("scheme", "M", "projection", "velocity", "pressure", "of the projection",

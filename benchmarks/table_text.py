@@ -11,10 +11,10 @@ ROOT = Path(__file__).parents[1]
 Row = dict[str, Any]
 
 
-def results(name: str) -> list[Row]:
-    """Rows of a benchmark."""
+def results(name: str, rows: str = "rows") -> list[Row]:
+    """Rows of a benchmark, which are called so in its file."""
     path = ROOT / "benchmarks" / "results" / f"{name}.json"
-    return json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return json.loads(path.read_text(encoding="utf-8"))[rows]
 
 
 def markdown(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
