@@ -40,6 +40,7 @@ from .reduced_tables import (
     predicted_cavity,
     predicted_vortex,
     scheme_models,
+    settled_open_cavity,
 )
 from .table_text import ROOT
 from .wake_tables import (
@@ -90,6 +91,7 @@ TABLES: dict[str, Callable[[], str]] = {
         predicted_vortex,
         predicted_cavity,
         larger_cavity,
+        settled_open_cavity,
         particle_step,
         versions,
         ahead_of_time,

@@ -123,7 +123,7 @@ def particle_cavity() -> str:
     return _particles("lid_driven_cavity", 24, timed=True)
 
 
-def _predicted(scene: str, *sides: int) -> str:
+def _predicted(scene: str, *sides: int, size: str = "{0} x {0}") -> str:
     """Models on moving particles at unseen Reynolds numbers, and what they are beside."""
     header = ("particles", "start", "Re", "M", "projection", "velocity", "pressure",
               "of the projection", "low-passed", "full model's sound", "level (peak)",
@@ -131,7 +131,7 @@ def _predicted(scene: str, *sides: int) -> str:
     names = ("velocity", "pressure", "floor_pressure", "slow_pressure", "sound")
     rows = [
         (
-            f"{side} x {side}",
+            size.format(side),
             row["arrangement"],
             f"{row['reynolds']:g}",
             str(row["modes"]),
@@ -164,6 +164,11 @@ def predicted_cavity() -> str:
 def larger_cavity() -> str:
     """Of the cavity of 100 x 100 particles, at the Reynolds number that it was trained at."""
     return _predicted("lid_driven_cavity", 100)
+
+
+def settled_open_cavity() -> str:
+    """Of the open cavity, once it has settled."""
+    return _predicted("open_cavity", 80, size="dx = 5 mm")
 
 
 def particle_step() -> str:
