@@ -196,7 +196,7 @@ def refresh_list(search, neighbors: VerletList | WallList, position, motion):
 def is_outdated(search, neighbors: VerletList | WallList, position, motion):
     """Whether particles that move on by up to `motion` [m] would outrun the list's skin."""
     moved = search.largest_motion(neighbors, position)[0]
-    return moved + lax.stop_gradient(motion) > 0.5 * search.skin
+    return ~(moved + lax.stop_gradient(motion) <= 0.5 * search.skin)  # nor where that is NaN
 
 
 def _arranged(state: ParticleState, order: Callable) -> ParticleState:

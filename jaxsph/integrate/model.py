@@ -42,7 +42,8 @@ class Model(eqx.Module):
         return auxiliary
 
     def begin(self, state: Any) -> tuple[Any, Any]:
-        """A state as steps keep it, and the auxiliary structure for it, built anew.
+        """A state as steps keep it, and an auxiliary structure for `keep_up`, which comes before
+        all else and builds it if this has not.
 
         Steps keep a state as it is unless a model that several devices run arranges it otherwise;
         `rates`, `finish`, `inspect` and limits are then asked of such a state.

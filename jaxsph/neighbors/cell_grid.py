@@ -98,9 +98,15 @@ class CellGrid:
         )
         return CellGrid(Box(lower, upper, periodic), shape, self.reach)
 
-    def counts(self, position: Float[Array, "points dim"]) -> Int[np.ndarray, " cells"]:
-        """How many points are in each cell (outside jit, to choose capacities)."""
-        return np.bincount(np.asarray(self.locate(position)), minlength=self.cells)
+    def counts(
+        self,
+        position: Float[Array, "points dim"],
+        taking_part: Bool[np.ndarray, " points"] | None = None,
+    ) -> Int[np.ndarray, " cells"]:
+        """How many points, of those that take part, are in each cell (outside jit, to choose
+        capacities)."""
+        cell = np.asarray(self.locate(position))
+        return np.bincount(cell if taking_part is None else cell[taking_part], minlength=self.cells)
 
     def longest_run(
         self, here: Int[np.ndarray, " cells"], there: Int[np.ndarray, " cells"]

@@ -22,7 +22,8 @@ from .rows_of_devices import RowsOfDevices
 
 CAPACITY_MARGIN = 1.15  # room in the list over its need at the start; every slot costs time
 RUN_MARGIN = 1.25  # the same for runs of cells
-_ASKED = 200_000  # particles counted one by one before a run, a second's work
+_ASKED = 20_000  # particles whose neighbours are counted before a run
+_ROUNDED = 1e-6  # round-off of single precision in a distance
 
 
 class VerletList(eqx.Module):
@@ -148,12 +149,12 @@ class NeighborSearch(eqx.Module):
         """
         if position.shape[0] == 0:
             raise ValueError("position: got no particles; give at least one.")
-        radius = support + skin
+        radius, position = support + skin, lax.stop_gradient(position)
         check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
         count = grid.counts(position)
         run_capacity = int(max(margin, RUN_MARGIN) * grid.longest_run(count, count)) + 2
-        largest = most_around(Cloud(position, box), position, radius) - 1  # itself is one
+        largest = most_around(box, position, position, radius) - 1  # itself is one
         capacity = max(8, int(np.ceil(margin * largest)))
         capacity = min(capacity, max(1, position.shape[0] - 1))
         longways = (_along(grid, axis) for axis in range(box.dim))
@@ -221,11 +222,17 @@ def _inverse(order: Int[Array, " particles"]) -> Int[Array, " particles"]:
     return jnp.zeros_like(order).at[order].set(places, unique_indices=True)
 
 
-def most_around(cloud: Cloud, places: Float[Array, "places dim"], radius: float) -> int:
-    """The most points of a cloud within a radius of a place; of many places some are asked, as a
-    list that proves too short is made anew with more room."""
-    asked = np.asarray(places)[:: 1 + len(places) // _ASKED]
-    return int(cloud.count_around(asked, radius).max(initial=0))
+def most_around(
+    box: Box, points: Float[Array, "points dim"], places: Float[Array, "places dim"], radius: float
+) -> int:
+    """The most points within a radius of a place, of those that are finite (a run names the rest).
+
+    Of many places some are asked: a run that finds its list too short makes it anew.
+    """
+    points, places = (x[np.isfinite(x).all(axis=1)] for x in map(np.asarray, (points, places)))
+    asked = places[:: 1 + len(places) // _ASKED]
+    radius = radius * (1.0 + _ROUNDED)  # single precision may see a tie there as nearer
+    return int(Cloud(points, box).count_around(asked, radius).max(initial=0))
 
 
 def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:

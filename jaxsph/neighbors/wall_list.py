@@ -195,11 +195,11 @@ class WalledSearch(eqx.Module):
         Raises:
             ValueError: as `NeighborSearch.allocate`.
         """
+        position = lax.stop_gradient(position)
         fluid = NeighborSearch.allocate(position, box, support, skin, margin)
         radius = support + skin
         reach_grid = CellGrid.with_width(box, 0.5 * spacing, reach=0)
-        of_walls = Cloud(ghosts, box)
-        distance = of_walls.nearest(reach_grid.centers)[0]
+        distance = Cloud(ghosts, box).nearest(reach_grid.centers)[0]
         half_diagonal = 0.5 * math.hypot(*reach_grid.widths)
         within_reach = jnp.asarray(distance < radius + half_diagonal)
         wall_grid = CellGrid.with_width(_around(box, radius), 0.5 * radius, reach=2)
@@ -217,14 +217,15 @@ class WalledSearch(eqx.Module):
         near = np.asarray(whole._may_see(jnp.asarray(reach_grid.centers, position.dtype)))
         free = near & (distance > 0.72 * spacing)  # between ghosts is no room
         room = int(free.sum() * np.prod(reach_grid.widths) / spacing**box.dim)
-        near = position[np.asarray(whole._may_see(position))]
+        near = np.asarray(whole._may_see(position))
+        of_fluid, of_ghosts = wall_grid.counts(position, near), wall_grid.counts(ghosts)
+        near = np.asarray(position)[near]
         count = room if len(near) < _FILLED * room else len(near)  # fluid may flow there yet
-        of_fluid, of_ghosts = wall_grid.counts(near), wall_grid.counts(ghosts)
         near_run = wall_grid.longest_run(of_ghosts, of_fluid)
         ghost_run = wall_grid.longest_run(of_fluid, of_ghosts)
         more = max(margin, RUN_MARGIN) if moving else 1.0
         largest = max(
-            most_around(of_walls, near, radius), most_around(Cloud(near, box), ghosts, radius)
+            most_around(box, ghosts, near, radius), most_around(box, near, ghosts, radius)
         )
         return replace(
             whole,

@@ -28,7 +28,8 @@ def none_left(status: np.ndarray) -> str:
     if not status.all():
         return ""
     count = "the one member is" if len(status) == 1 else f"all {len(status)} members are"
-    return f"{count} lost: {explanation(status[0])}."
+    first = "" if len(status) == 1 else "of the first, "
+    return f"{count} lost: {first}{explanation(status[0])}."
 
 
 def results_of(

@@ -12,6 +12,7 @@ from benchmarks import (
     convergence,
     extrapolation,
     inner_products,
+    label_animation,
     paper_rom,
     right_hand_side,
     sampled_rom,
@@ -138,6 +139,11 @@ def test_cases_of_the_paper(scene):
     assert {(c.kind, c.reynolds, c.modes, c.projection) for c in wanted} == paper.printed.keys()
     for kind in paper.kinds.values():
         assert kind.borders == (PLANS[scene].borders if kind.reynolds[1:] else None)
+
+
+def test_the_wave_of_the_moving_picture_has_two_periods():
+    for point in (*label_animation.TRAINED_ON, label_animation.UNSEEN):
+        assert label_animation.wave(**point).schedule.intervals == 70
 
 
 def test_cases_at_a_scale():

@@ -13,7 +13,7 @@ from jaxsph import FullModel, Schedule, SimulationError, Snapshot, simulate
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.effects import Continuity, LaminarViscosity, PressureForce
 from jaxsph.integrate import Fault, FaultCode, Model, integrate
-from jaxsph.scenes import taylor_green
+from jaxsph.scenes import lid_driven_cavity, taylor_green
 from jaxsph.schemes import DeltaPlus
 
 NEVER = 1e9
@@ -112,6 +112,15 @@ def test_the_auxiliary_structure_is_prepared_once_an_interval():
     (x, count), _, _, _ = start(model, 0.1, 5, 3)
     np.testing.assert_allclose(x, 1.5**3, rtol=1e-14)  # three Euler steps of 0.5; round-off
     np.testing.assert_array_equal(count, 15.0)  # each step is finished once
+
+
+@pytest.mark.parametrize("make, sorts", [(taylor_green, 1), (lid_driven_cavity, 4)])
+def test_a_full_model_s_program_makes_its_list_in_one_place(make, sorts):
+    """Particles are sorted once; with walls those near them are found, they and ghosts sorted."""
+    scene = make(16)
+    model, step = scene.model(), jnp.asarray(scene.time_step)
+    run = jax.jit(lambda state: integrate(model, state, np.int32(0), step, 2, 2))
+    assert run.lower(scene.state).as_text().count("stablehlo.sort") == sorts
 
 
 # ------------------------------------------------------------------ faults

@@ -211,6 +211,24 @@ def test_allocation_fits_its_own_particles_exactly_and_agrees_with_a_tree(box):
     assert listed_pairs(neighbors) == expected  # no tie at the radius with this seed
 
 
+def test_capacities_are_chosen_while_a_derivative_is_taken():
+    box, place = Box.unit_periodic(2), np.random.default_rng(2).uniform(size=(COUNT, 2))
+    fixed = NeighborSearch.allocate(jnp.asarray(place), box, SUPPORT, SKIN)
+
+    def moved(way):
+        position = jnp.asarray(place) + way
+        assert NeighborSearch.allocate(position, box, SUPPORT, SKIN) == fixed
+        return jnp.sum(position)
+
+    assert jax.grad(moved)(0.0) == 2 * COUNT
+
+
+def test_a_place_that_is_not_finite_counts_as_nobody_s_neighbour():
+    place = jnp.asarray([[0.1, 0.5], [jnp.nan, 0.5], [0.15, 0.5]])
+    for box in (Box.unit_periodic(2), Box((0.0, 0.0), (1.0, 1.0), (CLOSED, CLOSED))):
+        assert NeighborSearch.allocate(place, box, SUPPORT, SKIN).capacity == 2
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_box_too_small_for_the_support_raises(dim):
     position = jnp.zeros((1, dim))

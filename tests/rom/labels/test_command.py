@@ -54,7 +54,7 @@ def test_a_free_surface_from_two_lines(tmp_path, monkeypatch, capsys):
         assert files == {"member-000.h5", *others}
     none = [model, "--at", "amplitude=5,1e30", "--reynolds", "500", "--out", "none"]
     assert main(["predict", *none]) == 1
-    assert "error: all 2 members are lost: " in capsys.readouterr().err
+    assert "error: all 2 members are lost: of the first, " in capsys.readouterr().err
     assert main(["predict", *lost, "--fields"]) == 2
     assert "--fields: is of models on points" in capsys.readouterr().err
 
