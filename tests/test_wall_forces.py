@@ -18,7 +18,7 @@ from jaxsph.integrate import integrate
 from jaxsph.io import read_forces, read_overview, read_trajectory, snapshot_blocks
 from jaxsph.plotting import forces_figure
 from jaxsph.report.run_report import write_run_report
-from jaxsph.scenes import Scale, couette, enclosed_flow, taylor_green
+from jaxsph.scenes import Scale, couette, enclosed_flow, sloshing, taylor_green
 from jaxsph.schemes import Consistent, DeltaPlus
 from jaxsph.wall_forces import loads
 from jaxsph.wall_surface import moment
@@ -340,3 +340,18 @@ def test_parts_that_hold_nothing_or_twice_are_refused(regions, message):
     region = BoxRegion((0.0, 0.0), (1.0, 1.0)) & ~disc
     with pytest.raises(ValueError, match=message):
         jaxsph.Walls.around(region, space, parts=parts)
+
+
+def test_a_tank_with_dry_walls_gets_what_its_water_loses():
+    """Ghosts above the water line have no volume; their empty slots gave forces of NaN."""
+    scene = sloshing(24)
+    model, state, walls = scene.model(), scene.state, WallForces.of(scene)
+    rates = model.functional(START, state, model.prepare(state))
+    lost = -float(scene.mass) * (np.asarray(rates.velocity)[:, 1] + 9.81).sum()
+    assert float(walls(model, START, state)[0]["walls"][1]) == pytest.approx(lost, rel=1e-9)
+
+    def upward(state):
+        force, torque = walls(model, START, state)
+        return force["walls"][1] + torque["walls"]
+
+    assert np.isfinite(np.asarray(jax.grad(upward)(state).density)).all()

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
+
 from ..at_ghosts import Otherwise
 from ..pairs import PairTerm
 from ..ramps import ramp
@@ -42,7 +44,8 @@ def moving_wall_divergence(pair, i, j):
 
 def _handed(pair, i, j):
     """F_j W_ij V_j / V_i"""
-    return j.gathered_flux * (pair.kernel * j.volume / i.volume)
+    own = jnp.where(i.volume > 0.0, i.volume, 1.0)  # of a dry ghost's empty slots it is 0
+    return j.gathered_flux * (pair.kernel * j.volume / own)
 
 
 class AdjointContinuity(Effect):
