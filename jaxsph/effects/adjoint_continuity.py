@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import jax.numpy as jnp
-
 from ..at_ghosts import Otherwise
 from ..pairs import PairTerm
 from ..ramps import ramp
@@ -11,7 +9,7 @@ from ..symmetric import smallest_eigenvalue
 from .base import Effect
 from .continuity import VELOCITY_DIVERGENCE
 from .density_diffusion import RENORMALISATION
-from .wall_pressure import GHOST_WEIGHT, per_weight
+from .wall_pressure import GHOST_WEIGHT, own_volume, per_weight
 
 _FILM = (0.02, 0.08)  # of the eigenvalue: 0 in a film of one layer, 0.085 and more in a corner
 
@@ -44,8 +42,7 @@ def moving_wall_divergence(pair, i, j):
 
 def _handed(pair, i, j):
     """F_j W_ij V_j / V_i"""
-    own = jnp.where(i.volume > 0.0, i.volume, 1.0)  # of a dry ghost's empty slots it is 0
-    return j.gathered_flux * (pair.kernel * j.volume / own)
+    return j.gathered_flux * (pair.kernel * j.volume / own_volume(i))
 
 
 class AdjointContinuity(Effect):

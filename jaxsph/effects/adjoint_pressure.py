@@ -15,7 +15,7 @@ from ..symmetric import product, times
 from .base import Context, Effect, given
 from .continuity import Continuity
 from .pressure_force import PressureForce
-from .wall_pressure import GHOST_WEIGHT, WallPressure, per_weight
+from .wall_pressure import GHOST_WEIGHT, WallPressure, own_volume, per_weight
 
 _LONELY = 0.05  # of a full neighbourhood's kernel sum: no mean is taken over fewer
 _BESIDE = (0.0, 0.02)  # of the kernel's sum that is ghosts'; beside a wall it is a quarter
@@ -88,12 +88,12 @@ def ghost_force(pair, i, j):
 
 def wall_rough_divergence(pair, i, j):
     """L_i (u_i - s_i) . grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
-    return rough(pair, i) + j.handed_flux * (pair.kernel / i.volume)
+    return rough(pair, i) + j.handed_flux * (pair.kernel / own_volume(i))
 
 
 def wall_pressure_flux(pair, i, j):
     """p_i L_i grad_i W_ig V_g, and the particle's share of what the ghost gathered"""
-    return pressed(pair, i) + j.handed_force * (pair.kernel / i.volume)
+    return pressed(pair, i) + j.handed_force * (pair.kernel / own_volume(i))
 
 
 WALL_SHARE = PairTerm("wall_share", (), None, Otherwise((), neighbor_share))

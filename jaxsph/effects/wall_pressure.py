@@ -53,6 +53,11 @@ class WallPressure(Effect):
         return {"pressure": pressure, "density": density, "volume": context.mass / density}
 
 
+def own_volume(i):
+    """V_i to divide by: 1 where it is 0, as in the empty slots of a ghost that is dry."""
+    return jnp.where(i.volume > 0.0, i.volume, 1.0)
+
+
 def per_weight(total, weight, space):
     """total / weight, and 0 for a ghost that no fluid particle reaches."""
     reached = weight > _REACHED * space.kernel_at_spacing
