@@ -16,6 +16,7 @@ from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
 from .likely_cause import likely_cause, squeezed_water
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
+from .parking import Parking
 from .particles import ParticleState
 from .trajectory import Snapshot
 from .walls import Walls
@@ -37,6 +38,11 @@ class FullModel(Model):
 
     functional: SPHFunctional
     search: NeighborSearch | WalledSearch
+
+    @property
+    def parking(self) -> Parking | None:
+        """Where particles wait that are in no flow, if some come in or go out."""
+        return self.search.parking
 
     def at(self, time):
         walls = self.functional.walls
@@ -73,9 +79,11 @@ class FullModel(Model):
         return search, speed * time_step
 
     def begin(self, state):
-        if self.search.devices is None:
+        if self.search.devices is None and self.parking is None:
             return state, self._outdated(state)
         neighbors = self.prepare(state)
+        if self.search.devices is None:
+            return state, neighbors
         return _arranged(state, neighbors.sort), neighbors.in_place()
 
     def _outdated(self, state):
@@ -87,18 +95,28 @@ class FullModel(Model):
         return eqx.tree_at(lambda neighbors: neighbors.reference, empty, away)
 
     def keep_up(self, state, auxiliary, time_step):
-        if self.search.devices is None:
+        if self.search.devices is None and self.parking is None:
             return state, self.refresh(auxiliary, state, time_step)
         search, motion = self._motion(state, time_step)
 
         def rebuilt(state, neighbors):
+            state = self._exchanged(state, neighbors)
             new = search.build(state.position)
+            if search.devices is None:
+                return state, new
             return _arranged(state, new.sort), new.in_place(neighbors.order)
 
         outdated = is_outdated(search, auxiliary, state.position, motion)
         return lax.cond(outdated, rebuilt, lambda *same: same, state, auxiliary)
 
+    def _exchanged(self, state, neighbors):
+        """A state with what came in and went out since its list was made."""
+        for effect in self.functional.effects:
+            state = effect.exchanged(state, neighbors.reference, self.functional.fluid)
+        return state
+
     def end(self, state, auxiliary):
+        state = self._exchanged(state, auxiliary)
         if self.search.devices is None:
             return state
         return _arranged(state, auxiliary.by_number)
@@ -116,10 +134,18 @@ class FullModel(Model):
         return Fault.first_of(
             step,
             *body_checks(walls),
-            *wall_checks(walls, state.position, auxiliary.first),
+            *wall_checks(walls, state.position, auxiliary.first, self.parking),
+            *here._opening_checks(state, auxiliary),
             *field_checks(state, here.functional.fluid.reference_density, auxiliary.first),
             *list_checks(here.search, auxiliary, state.position),
         )
+
+    def _opening_checks(self, state, neighbors):
+        """The check that particles enough are parked for those that come in."""
+        if self.parking is None:
+            return ()
+        effects, where = self.functional.effects, (state.position, neighbors.reference)
+        return tuple((FaultCode.NONE_PARKED, e.exhausted(*where), -1) for e in effects)
 
     def step_limit(self, state, change):
         """The least of 1.5 h / (c0 + |u|) s, 0.25 (h / |a|)^1/2, 0.4 b / |u| and the limits of the
@@ -184,6 +210,7 @@ class FullModel(Model):
             density=state.density,
             pressure=self.functional.fluid.pressure(state.density),
             bodies=state.bodies,
+            active=None if self.parking is None else ~self.parking.holds(state.position),
         )
 
 
@@ -232,12 +259,16 @@ def body_checks(walls: Walls | None):
     )
 
 
-def wall_checks(walls: Walls | None, position, first: Callable = jnp.argmax):
+def wall_checks(
+    walls: Walls | None, position, first: Callable = jnp.argmax, parking: Parking | None = None
+):
     """The check that no particle has gone through a wall, where there are walls; `first` is the
     number of the first particle of those marked."""
     if walls is None:
         return ()
     beyond = walls.beyond(lax.stop_gradient(position))
+    if parking is not None:
+        beyond = beyond & ~parking.holds(position)
     return ((FaultCode.BEYOND_WALL, jnp.any(beyond), first(beyond)),)
 
 

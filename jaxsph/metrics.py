@@ -112,6 +112,8 @@ def surface_height(
     if not width > 0.0:
         raise ValueError(f"width: must be positive, got {width:g} m.")
     column = float(scene.mass) / trajectory.density
+    if trajectory.active is not None:
+        column = np.where(trajectory.active, column, 0.0)
     for axis, place in enumerate(places):
         low, length = box.lower[axis], box.lengths[axis]
         if not low <= place <= low + length:
@@ -170,7 +172,8 @@ def probe(
     speed, pressure = [], []
     for k in range(len(trajectory.time)):
         values = np.concatenate([trajectory.velocity[k], trajectory.pressure[k][:, None]], axis=1)
-        fields, overflow = _interpolated(interpolated, trajectory.position[k], values)
+        active = None if trajectory.active is None else trajectory.active[k]
+        fields, overflow = _interpolated(interpolated, trajectory.position[k], values, active)
         if bool(overflow):
             raise ValueError(f"probe: particles have clumped at snapshot {k}; cells are too full.")
         fields = np.asarray(fields)
@@ -180,8 +183,8 @@ def probe(
 
 
 @eqx.filter_jit  # compiled once for runs alike
-def _interpolated(rule: KernelMap, position, values):
-    return rule(position, values)
+def _interpolated(rule: KernelMap, position, values, active):
+    return rule(position, values, active)
 
 
 def local_quadratic(

@@ -176,6 +176,7 @@ def simulate(
             mean_forces=stacked.mean_forces,
             mean_torques=stacked.mean_torques,
             bodies=stacked.bodies,
+            active=stacked.active,
             metadata={**metadata, **took.metadata()},
         )
 

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .body_state import BodyState
 from .particles import ParticleState
@@ -25,7 +25,8 @@ class Snapshot(eqx.Module):
     `coordinates` are the reduced coordinates where a reduced model made the snapshot; `forces` (n,)
     [N] and `torques` [N m] those of the fluid on its walls and their named parts, where measured,
     `mean_forces` and `mean_torques` their means over the time since the snapshot before; `bodies`
-    the state of free bodies, where there are any.
+    the state of free bodies, where there are any; `active` which particles are in the flow and not
+    parked, where there are openings.
     """
 
     position: Float[Array, "*times particles dim"]
@@ -38,6 +39,23 @@ class Snapshot(eqx.Module):
     mean_forces: dict[str, Array] = eqx.field(default_factory=dict)
     mean_torques: dict[str, Array] = eqx.field(default_factory=dict)
     bodies: BodyState | None = None
+    active: Bool[Array, "*times particles"] | None = None
+
+    def in_flow(self) -> Snapshot:
+        """A single snapshot with those particles alone that are in the flow (outside jit)."""
+        if self.active is None:
+            return self
+        held = np.asarray(self.active)
+        position, velocity, density, pressure = (
+            np.asarray(field)[held]
+            for field in (self.position, self.velocity, self.density, self.pressure)
+        )
+        return eqx.tree_at(
+            lambda s: (s.position, s.velocity, s.density, s.pressure, s.active),
+            self,
+            (position, velocity, density, pressure, None),
+            is_leaf=lambda leaf: leaf is None,
+        )
 
 
 class Trajectory(eqx.Module):
@@ -55,6 +73,8 @@ class Trajectory(eqx.Module):
             stage of every step; the first ones those of its instant.
         metadata: scene, parameters, and what the run took; JSON-like.
         bodies: the state of free bodies (S, F, ...), where there are any.
+        active: (S, N), which particles are in the flow, where some come in or go out; None where
+            all are.
     """
 
     time: Float[np.ndarray, " times"]
@@ -69,6 +89,7 @@ class Trajectory(eqx.Module):
     mean_torques: dict[str, Float[np.ndarray, "times ..."]] = eqx.field(default_factory=dict)
     metadata: dict[str, Any] = eqx.field(static=True, default_factory=dict)
     bodies: BodyState | None = None
+    active: Bool[np.ndarray, "times particles"] | None = None
 
     @property
     def particles(self) -> int:
@@ -100,7 +121,8 @@ class Trajectory(eqx.Module):
         of_all = (self.forces, self.torques, self.mean_forces, self.mean_torques)
         loads = ({k: v[number] for k, v in each.items()} for each in of_all)
         bodies = jax.tree.map(lambda field: field[number], self.bodies)
-        return Snapshot(*(field[number] for field in fields), coordinates, *loads, bodies)
+        active = None if self.active is None else self.active[number]
+        return Snapshot(*(field[number] for field in fields), coordinates, *loads, bodies, active)
 
     # What follows imports inside, since plotting and io import this module.
 

@@ -1,10 +1,15 @@
-"""Scenes that reduced models know: a region that stays as it is."""
+"""Scenes that reduced models know: a region and particles that stay the same."""
 
 from jaxsph.scenes import Scene
 
 
 def check_still(scene: Scene) -> None:
-    """A ValueError if bodies are moved through the fluid of a scene."""
+    """A ValueError if bodies are moved through the fluid of a scene, or particles come and go."""
+    if scene.parking is not None:
+        raise ValueError(
+            f"scene: particles come in and go out of {scene.name}, and reduced models follow the "
+            'same ones; learn from the flow with a fringe (ends="fringe").'
+        )
     if scene.walls is not None and scene.walls.bodies is not None:
         raise ValueError(
             f"scene: bodies are moved through the fluid of {scene.name}, and reduced models know "

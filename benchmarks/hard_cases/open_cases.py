@@ -11,7 +11,15 @@ import jax.numpy as jnp
 from jaxsph import BallRegion, WallPart
 from jaxsph.effects import Fringe, Varying
 from jaxsph.integrate import FaultCode
-from jaxsph.scenes import Scale, Scene, channel_cylinder, cylinder, floating_box, poiseuille_open
+from jaxsph.scenes import (
+    FringeEnds,
+    Scale,
+    Scene,
+    channel_cylinder,
+    cylinder,
+    floating_box,
+    poiseuille_open,
+)
 from jaxsph.scenes.open_channel import open_channel
 from jaxsph.scenes.poiseuille_open import LENGTH
 from jaxsph.schemes import SharpAtWalls
@@ -60,7 +68,7 @@ def _near_a_wall(gap: float, end_time: float) -> Run:
     scene = open_channel(
         "near-a-wall",
         length=4.0,
-        fringe=1.5,
+        ends=FringeEnds(1.5),
         height=3.0,
         mean_speed=2.0 / 3.0,
         obstacle=body,

@@ -25,6 +25,8 @@ from .isotropic_viscosity import IsotropicViscosity as IsotropicViscosity
 from .kernel_correction import KernelCorrection as KernelCorrection
 from .laminar_viscosity import LaminarViscosity as LaminarViscosity
 from .local_no_slip import LocalNoSlip as LocalNoSlip
+from .openings import Opening as Opening
+from .openings import Openings as Openings
 from .pair_repulsion import PairRepulsion as PairRepulsion
 from .particle_shifting import ParticleShifting as ParticleShifting
 from .pressure_force import PressureForce as PressureForce

@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..fluid import Fluid
 from ..neighbors import VerletList
 from ..pairs import PairTerm, Space
+from ..parking import Parking
+from ..particles import ParticleState
 from ..wall_surface import Loads, WallSurface
 from ..walls.moving_body import Bodies
 
@@ -73,6 +75,10 @@ class Effect(eqx.Module):
         """The effect's name in reports and compiled programs."""
         return type(self).__name__
 
+    def parks_at(self) -> Parking | None:
+        """Where particles wait that are in no flow; None for an effect that puts none in."""
+        return None
+
     @property
     def frees_surface(self) -> bool:
         """Whether the fluid may leave a part of its vessel or its box empty."""
@@ -115,6 +121,17 @@ class Effect(eqx.Module):
     def governed(self, context: Context, fields: dict, rates: dict[str, Array]) -> dict[str, Array]:
         """The rates that all effects together give, as this one leaves them."""
         return rates
+
+    def exchanged(
+        self, state: ParticleState, since: Float[Array, "particles dim"], fluid: Fluid
+    ) -> ParticleState:
+        """A state with what has come in and gone out on the way from where particles were when
+        their neighbour list was made."""
+        return state
+
+    def exhausted(self, position: Float[Array, "particles dim"], since) -> Bool[Array, ""] | bool:
+        """Whether more have to come in than there are parked."""
+        return False
 
     def transported(self, context: Context, fields: dict, sums: dict) -> dict[str, Array]:
         """Contributions that no effect governs: of a change of frame, as to points that stay."""

@@ -23,6 +23,7 @@ class FaultCode(IntEnum):
     STEPS_EXHAUSTED = 8
     CLUMPED = 9
     BODY_MET_WALL = 10
+    NONE_PARKED = 11
 
 
 # what it means, and what to do where nothing more is known
@@ -69,6 +70,10 @@ _EXPLANATIONS = {
     FaultCode.BODY_MET_WALL: (
         "a free body met a wall or another body, and contact is not modelled",
         "end the run before, or leave more room around the body",
+    ),
+    FaultCode.NONE_PARKED: (
+        "more particles come in through the openings than are parked",
+        "park more of them at the start, or end the run before",
     ),
 }
 

@@ -63,11 +63,15 @@ class KernelMap(eqx.Module):
 
     @full_precision
     def __call__(
-        self, position: Float[Array, "particles dim"], values: Float[Array, "particles fields"]
+        self,
+        position: Float[Array, "particles dim"],
+        values: Float[Array, "particles fields"],
+        active: Bool[Array, " particles"] | None = None,
     ) -> tuple[Float[Array, "points fields"], Bool[Array, ""]]:
-        """Fields at the points, and whether a cell held more particles than there is room for."""
+        """Fields at the points, and whether a cell held more particles than there is room for;
+        those that are not active are left out."""
         space, dim = self.space, self.space.box.dim
-        source = self.grid.bin(position, self.particles_per_cell)
+        source = self.grid.bin(position, self.particles_per_cell, active)
         table = jnp.concatenate([position, values], axis=1)[source.order]
         table = jnp.pad(table, ((0, 1), (0, 0)))  # a last row, which is given no weight
         points = jnp.pad(self.points[self.bins.order], ((0, 1), (0, 0)))

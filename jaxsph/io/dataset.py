@@ -31,6 +31,8 @@ def dataset(trajectory: Trajectory) -> Any:
     if trajectory.coordinates is not None:
         values = np.asarray(trajectory.coordinates)
         arrays["coordinates"] = (("time", "mode"), values, {"units": UNITS["coordinates"]})
+    if trajectory.active is not None:
+        arrays["active"] = (("time", "particle"), np.asarray(trajectory.active))
     axes = {
         "time": ("time", np.asarray(trajectory.time), {"units": UNITS["time"]}),
         "direction": list("xyz"[: fields["position"].shape[-1]]),

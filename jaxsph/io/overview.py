@@ -17,8 +17,7 @@ from .trajectory_file import (
     TrajectoryFileError,
     opened,
     patient,
-    read_bodies,
-    read_loads,
+    read_more,
     schedule_of,
 )
 
@@ -113,5 +112,5 @@ def read_snapshot(path: str | os.PathLike, number: int = -1) -> tuple[float, Sna
         number %= count
         coordinates = file["coordinates"][number] if "coordinates" in file else None
         fields = (file[name][number] for name in FIELDS)
-        more = {**read_loads(file, number), "bodies": read_bodies(file, number)}
+        more = read_more(file, number)
         return float(file["time"][number]), Snapshot(*fields, coordinates=coordinates, **more)

@@ -22,6 +22,7 @@ def point_cloud(time: float, snapshot: Snapshot) -> Any:
         raise ImportError(
             "pyvista is not there; install it, or the extra jaxsph[pyvista]."
         ) from None
+    snapshot = snapshot.in_flow()
     missing = 3 - snapshot.position.shape[-1]
 
     def in_space(vectors):

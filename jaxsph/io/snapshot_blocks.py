@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..trajectory import Trajectory
-from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, read_bodies, read_loads
+from .trajectory_file import FIELDS, TrajectoryFileError, opened, patient, read_more
 
 
 def snapshot_blocks(path: str | os.PathLike, size: int, every: int = 1) -> Iterator[Trajectory]:
@@ -46,7 +46,7 @@ def snapshot_blocks(path: str | os.PathLike, size: int, every: int = 1) -> Itera
                 )
             fields = {name: file[name][block] for name in ("time", *FIELDS)}
             coordinates = file["coordinates"][block] if "coordinates" in file else None
-            more = {**read_loads(file, block), "bodies": read_bodies(file, block)}
+            more = read_more(file, block)
             return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **more)
 
     starts = range(0, count, size * every)

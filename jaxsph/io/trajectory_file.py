@@ -31,6 +31,7 @@ UNITS = {
     "density": "kg/m^3",
     "pressure": "Pa",
     "coordinates": "1",
+    "active": "1",
     "time": "s",
     "step": "1",
 }
@@ -121,8 +122,9 @@ def read_trajectory(path: str | os.PathLike) -> Trajectory:
             metadata["steps"] = int(file["step"][count - 1])
         fields = {name: file[name][:count] for name in ("time", *FIELDS)}
         coordinates = file["coordinates"][:count] if "coordinates" in file else None
-        more = {**read_loads(file, slice(count)), "bodies": read_bodies(file, slice(count))}
-        return Trajectory(**fields, coordinates=coordinates, metadata=metadata, **more)
+        return Trajectory(
+            **fields, coordinates=coordinates, metadata=metadata, **read_more(file, slice(count))
+        )
 
 
 def read_walls(path: str | os.PathLike) -> np.ndarray | None:
@@ -203,6 +205,12 @@ def read_bodies(file: h5py.File, rows: int | slice) -> BodyState | None:
     if "bodies" not in file:
         return None
     return BodyState(**{name: file[f"bodies/{name}"][rows] for name in BODIES})
+
+
+def read_more(file: h5py.File, rows: int | slice) -> dict[str, Any]:
+    """What some snapshots have beside their fields: forces, free bodies, who is in the flow."""
+    active = file["active"][rows] if "active" in file else None
+    return {**read_loads(file, rows), "bodies": read_bodies(file, rows), "active": active}
 
 
 def schedule_of(file: h5py.File) -> Schedule:

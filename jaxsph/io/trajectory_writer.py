@@ -129,6 +129,8 @@ class TrajectoryWriter:
             text = _to_json(metadata)
             room = max(_METADATA_SPACE, 2 * len(text))
             file.attrs.create("metadata", np.bytes_(text), dtype=f"S{room}")
+            if getattr(scene, "parking", None) is not None:
+                add_dataset(file, "active", shapes["density"], np.dtype(bool), **COMPRESSION)
             for name, shape in shapes.items():
                 add_dataset(file, name, shape, np.dtype(state.position.dtype), **COMPRESSION)
             add_dataset(file, "time", (), np.dtype("float64"), fillvalue=np.nan)

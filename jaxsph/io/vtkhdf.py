@@ -2,7 +2,8 @@
 
 One HDF5 file by the VTKHDF specification 2.0, type PolyData: a vertex for each particle, the points
 of all steps one after another, and `Steps` that say where each begins. Vertices are the same at all
-times and are stored once. Two-dimensional vectors get a third component of zero.
+times and are stored once; where particles come in and go out each step says how many of them it
+has. Two-dimensional vectors get a third component of zero.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def write_vtkhdf(
         for number, block in enumerate(blocks):
             if number == 0:
                 _begin(root, block, fields)
-            _append(root, block, fields, number)
+            _append(root, block, fields)
             if progress is not None:
                 progress(1)
     return path
@@ -74,12 +75,12 @@ def _begin(root: h5py.Group, first: Trajectory, fields: Sequence[str]) -> None:
     root.attrs["Version"] = np.array([2, 0], np.int64)
     root.attrs["Type"] = np.bytes_("PolyData")
     root.attrs["units"] = "SI"
-    root["NumberOfPoints"] = np.array([particles], np.int64)
+    _rows(root, "NumberOfPoints", (), np.int64)
     for name in _CELLS:
         count = particles if name == "Vertices" else 0
         cells = root.create_group(name)
-        cells["NumberOfCells"] = np.array([count], np.int64)
-        cells["NumberOfConnectivityIds"] = np.array([count], np.int64)
+        _rows(cells, "NumberOfCells", (), np.int64)
+        _rows(cells, "NumberOfConnectivityIds", (), np.int64)
         cells["Connectivity"] = np.arange(count, dtype=np.int64)
         cells["Offsets"] = np.arange(count + 1, dtype=np.int64)
     _rows(root, "Points", (3,), first.position.dtype, "position", particles)
@@ -99,17 +100,22 @@ def _begin(root: h5py.Group, first: Trajectory, fields: Sequence[str]) -> None:
         _rows(steps, name, (len(_CELLS),), np.int64)
 
 
-def _append(root: h5py.Group, block: Trajectory, fields: Sequence[str], number: int) -> None:
+def _append(root: h5py.Group, block: Trajectory, fields: Sequence[str]) -> None:
     """The rows of one snapshot."""
-    start = number * block.particles
-    _extend(root["Points"], _padded(block.position[0]))
-    steps = root["Steps"]
+    snapshot, steps = block.snapshot(0).in_flow(), root["Steps"]
+    start, number, count = len(root["Points"]), steps.attrs["NSteps"], len(snapshot.position)
+    if number == 0 or block.active is not None:  # else all steps share the one part
+        _extend(root["NumberOfPoints"], [count])
+        for name in _CELLS:
+            for counted in ("NumberOfCells", "NumberOfConnectivityIds"):
+                _extend(root[name][counted], [count if name == "Vertices" else 0])
+    _extend(root["Points"], _padded(snapshot.position))
     for name in fields:
-        _extend(root["PointData"][name], _padded(getattr(block, name)[0]))
+        _extend(root["PointData"][name], _padded(getattr(snapshot, name)))
         _extend(steps["PointDataOffsets"][name], [start])
     _extend(steps["Values"], block.time)
     _extend(steps["PointOffsets"], [start])
-    _extend(steps["PartOffsets"], [0])  # the one part, whose vertices all steps share
+    _extend(steps["PartOffsets"], [len(root["NumberOfPoints"]) - 1])
     _extend(steps["NumberOfParts"], [1])
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         _extend(steps[name], np.zeros((1, len(_CELLS)), np.int64))

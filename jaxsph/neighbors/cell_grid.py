@@ -158,10 +158,21 @@ class CellGrid:
         ).astype(jnp.int32)
         return order, cell, edges
 
-    def bin(self, position: Float[Array, "points dim"], capacity: int) -> CellBins:
-        """Sort points into cells that hold at most `capacity` each; says so when one overflows."""
-        order, cell, edges = self.sort(self.locate(position))
+    def bin(
+        self,
+        position: Float[Array, "points dim"],
+        capacity: int,
+        taking_part: Bool[Array, " points"] | None = None,
+    ) -> CellBins:
+        """Sort points into cells that hold at most `capacity` each; says so when one overflows.
+        Those that take no part are in none."""
+        cell = self.locate(position)
+        if taking_part is not None:
+            cell = jnp.where(taking_part, cell, self.cells)
+        order, cell, edges = self.sort(cell)
         start, end = edges[:-1], edges[1:]
+        if taking_part is not None:
+            end = end.at[-1].set(start[-1])
         places = start[:, None] + jnp.arange(capacity, dtype=jnp.int32)[None, :]
         return CellBins(
             order=order,

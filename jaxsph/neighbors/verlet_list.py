@@ -16,6 +16,7 @@ from ..cloud import Cloud
 from ..devices import Devices
 from ..domain import Box
 from ..exchange import Exchange, least
+from ..parking import Parking, flowing
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 from .rows_of_devices import RowsOfDevices
@@ -122,6 +123,7 @@ class NeighborSearch(eqx.Module):
         depths: for each axis the particles that can be next to a device's own where cells are
             numbered along that axis first; none if that is not known.
         devices: that share the rows of the list, if several do.
+        parking: where particles wait that take no part, if some do.
     """
 
     grid: CellGrid = eqx.field(static=True)
@@ -131,6 +133,7 @@ class NeighborSearch(eqx.Module):
     run_capacity: int = eqx.field(static=True)
     depths: tuple[int, ...] = eqx.field(static=True, default=())
     devices: Devices | None = eqx.field(static=True, default=None)
+    parking: Parking | None = eqx.field(static=True, default=None)
 
     @classmethod
     def allocate(
@@ -140,8 +143,10 @@ class NeighborSearch(eqx.Module):
         support: float,
         skin: float,
         margin: float = CAPACITY_MARGIN,
+        parking: Parking | None = None,
     ) -> NeighborSearch:
-        """Choose capacities for particles near `position`, `margin` times what these need.
+        """Choose capacities for particles near `position`, `margin` times what these need; those
+        that are parked need none.
 
         Raises:
             ValueError: if a periodic box is too small for the support and its skin, or there is
@@ -150,17 +155,21 @@ class NeighborSearch(eqx.Module):
         if position.shape[0] == 0:
             raise ValueError("position: got no particles; give at least one.")
         radius, position = support + skin, lax.stop_gradient(position)
+        particles = position.shape[0]
+        position = flowing(position, parking)
         check_periodic(box, support, skin)
         grid = CellGrid.with_width(box, 0.5 * radius, reach=2)
         count = grid.counts(position)
         run_capacity = int(max(margin, RUN_MARGIN) * grid.longest_run(count, count)) + 2
         largest = most_around(box, position, position, radius) - 1  # itself is one
         capacity = max(8, int(np.ceil(margin * largest)))
-        capacity = min(capacity, max(1, position.shape[0] - 1))
+        capacity = min(capacity, max(1, particles - 1))
         longways = (_along(grid, axis) for axis in range(box.dim))
         count = count.reshape(grid.shape)
         depths = (_rounded(margin * g.depth(count.transpose(axes).ravel())) for g, axes in longways)
-        return cls(grid, support, skin, capacity, run_capacity, _Unread(depths))
+        return cls(
+            grid, support, skin, capacity, run_capacity, _Unread(depths), parking=parking
+        )
 
     @property
     def box(self) -> Box:
@@ -251,8 +260,9 @@ def check_periodic(box: Box, support: float, skin: float = 0.0) -> None:
 def _built(search: NeighborSearch, position) -> VerletList:
     position = lax.stop_gradient(position)
     grid, room = search.grid, (search.run_capacity, search.capacity)
+    taking_part = None if search.parking is None else ~search.parking.holds(position)
     if search.devices is None:
-        points = Sorted.of(grid, position)
+        points = Sorted.of(grid, position, taking_part)
         words = flags(grid, points, points, search.support + search.skin, search.run_capacity)
         largest = jnp.max(count_bits(words))
         longest = longest_run(grid, points, points)
@@ -263,7 +273,7 @@ def _built(search: NeighborSearch, position) -> VerletList:
         devices, exchange = search.devices, search.exchange(position.shape[0])
         grid, columns = _along(grid, int(np.argmin(search.depths or (0,))))
         position = devices.whole(position)  # each device sorts all
-        points = devices.whole(Sorted.of(grid, position[:, columns]))
+        points = devices.whole(Sorted.of(grid, position[:, columns], taking_part))
         radius = search.support + search.skin
         places = jnp.arange(points.count, dtype=jnp.int32)
         rows = RowsOfDevices.of(exchange, points.count)

@@ -16,6 +16,7 @@ from ..cloud import Cloud
 from ..devices import Devices
 from ..domain import Box
 from ..exchange import Exchange, Gathered
+from ..parking import Parking, flowing
 from .cell_grid import CellGrid
 from .cell_runs import Sorted, count_bits, flags, longest_run, pick
 from .rows_of_devices import RowsOfDevices
@@ -187,6 +188,7 @@ class WalledSearch(eqx.Module):
         spacing: float,
         margin: float = CAPACITY_MARGIN,
         moving: bool = False,
+        parking: Parking | None = None,
     ) -> WalledSearch:
         """Choose capacities for particles near `position`, `margin` times what these need.
 
@@ -196,7 +198,9 @@ class WalledSearch(eqx.Module):
             ValueError: as `NeighborSearch.allocate`.
         """
         position = lax.stop_gradient(position)
-        fluid = NeighborSearch.allocate(position, box, support, skin, margin)
+        fluid = NeighborSearch.allocate(position, box, support, skin, margin, parking)
+        particles = position.shape[0]
+        position = flowing(position, parking)
         radius = support + skin
         reach_grid = CellGrid.with_width(box, 0.5 * spacing, reach=0)
         distance = Cloud(ghosts, box).nearest(reach_grid.centers)[0]
@@ -209,7 +213,7 @@ class WalledSearch(eqx.Module):
             None if moving else within_reach,
             reach_grid,
             wall_grid,
-            position.shape[0],
+            particles,
             1,
             1,
             1,
@@ -229,7 +233,7 @@ class WalledSearch(eqx.Module):
         )
         return replace(
             whole,
-            near_capacity=min(position.shape[0], int(np.ceil(margin * count)) + 1),
+            near_capacity=min(particles, int(np.ceil(margin * count)) + 1),
             capacity=max(8, int(np.ceil(margin * largest))),
             near_run_capacity=int(max(margin, RUN_MARGIN) * near_run) + 2,
             ghost_run_capacity=max(1, math.ceil(more * ghost_run) + (2 if moving else 0)),
@@ -246,6 +250,10 @@ class WalledSearch(eqx.Module):
     @property
     def devices(self) -> Devices | None:
         return self.fluid.devices
+
+    @property
+    def parking(self) -> Parking | None:
+        return self.fluid.parking
 
     def enlarged(self) -> WalledSearch:
         """The same search with a fifth more room."""
@@ -284,6 +292,10 @@ class WalledSearch(eqx.Module):
     @partial(eqx.filter_jit, inline=True)
     def _may_see(self, position) -> Bool[Array, " points"]:
         """Whether a ghost may be within support + skin of each point."""
+        seeing = self._sees_there(position)
+        return seeing if self.parking is None else seeing & ~self.parking.holds(position)
+
+    def _sees_there(self, position) -> Bool[Array, " points"]:
         if self.within_reach is not None:
             return self.within_reach[self.reach_grid.locate(position)]
         grid = self.wall_grid

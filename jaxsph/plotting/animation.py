@@ -151,8 +151,9 @@ def _bodies(block: Trajectory) -> BodyState | None:
 
 def _shown(block: Trajectory, field: ParticleField) -> tuple[np.ndarray, np.ndarray]:
     """Positions (P, 2) [m] and values (P,) of the particles drawn."""
-    shown = middle_layer(block.position[0])
-    return block.position[0][shown, :2], field.value(block)[0][shown]
+    snapshot = block.snapshot(0).in_flow()
+    shown = middle_layer(snapshot.position)
+    return snapshot.position[shown, :2], field.value(snapshot)[shown]
 
 
 @dataclass(frozen=True)

@@ -30,11 +30,13 @@ def snapshot_figure(
 
     Args:
         time: of the snapshot [s].
-        snapshot: positions (N, n) [m] and fields, as read from a file.
+        snapshot: positions (N, n) [m] and fields, as read from a file; parked particles are not
+            drawn.
         fields: which ones to show.
         walls: places of the walls' ghosts (G, n) [m], drawn grey in two dimensions.
         box: of the run; what is beyond a periodic face is drawn up to it.
     """
+    snapshot = snapshot.in_flow()
     shown = middle_layer(np.asarray(snapshot.position))
     position = np.asarray(snapshot.position)[shown, :2]
     flat = walls is not None and walls.shape[1] == 2

@@ -39,18 +39,19 @@ def film(source: str | os.PathLike) -> str:
     times, places, values = [], [], [[] for _ in fields]
     box, shapes, reach = read_box(source), read_body_shapes(source), None
     for block in snapshot_blocks(source, 1, every):
-        shown = middle_layer(block.position[0])
+        snapshot = block.snapshot(0).in_flow()
+        shown = middle_layer(snapshot.position)
         times.append(float(block.time[0]))
-        place = np.asarray(block.position[0][shown, :2], np.float32)
+        place = np.asarray(snapshot.position[shown, :2], np.float32)
         reach = spacing(place) if reach is None else reach
         place, index = with_images(place, box, reach)
         solid = np.zeros((0, 2), np.float32)  # free bodies, grey as what has no value
         if shapes is not None:
-            solid = np.float32(shapes.places(block.snapshot(0).bodies))
+            solid = np.float32(shapes.places(snapshot.bodies))
         places.append(np.concatenate([place, solid]))
         grey = np.full(len(solid), np.nan, np.float32)
         for kept, field in zip(values, fields, strict=True):
-            value = np.asarray(field.value(block)[0][shown][index], np.float32)
+            value = np.asarray(field.value(snapshot)[shown][index], np.float32)
             kept.append(np.concatenate([value, grey]))
     walls = read_walls(source)
     walls = walls if walls is not None and walls.shape[1] == 2 else np.zeros((0, 2), np.float32)

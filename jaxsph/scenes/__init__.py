@@ -13,6 +13,9 @@ from .dam_break import dam_break as dam_break
 from .dam_break_3d import dam_break_3d as dam_break_3d
 from .elliptic_drop import elliptic_drop as elliptic_drop
 from .enclosed import enclosed_flow as enclosed_flow
+from .ends import Ends as Ends
+from .ends import FringeEnds as FringeEnds
+from .ends import OpenEnds as OpenEnds
 from .floating_box import floating_box as floating_box
 from .flow_through import flow_through as flow_through
 from .gresho_vortex import gresho_vortex as gresho_vortex

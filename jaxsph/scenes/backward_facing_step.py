@@ -11,6 +11,7 @@ from ..kernels import Kernel
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BoxRegion
 from .composed import pick_scale, positive
+from .ends import named_ends
 from .flow_through import flow_through
 from .scales import Scale
 from .scene import Scene
@@ -32,6 +33,7 @@ def backward_facing_step(
     *,
     upstream: float = 2.0,
     downstream: float = 10.0,
+    ends: str = "fringe",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -57,6 +59,7 @@ def backward_facing_step(
         reynolds: Reynolds number of mean speed and twice the channel's height.
         upstream: from the inflow to the step [m], rounded to whole spacings.
         downstream: length of the wide channel [m], its end rounded likewise.
+        ends: `fringe` or `openings`; what lies beyond the channel.
         scale: `small` (10 over the step), `half` (20) or `paper` (40).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -87,9 +90,9 @@ def backward_facing_step(
     return flow_through(
         "backward-facing-step",
         length=end,
-        fringe=FRINGE,
+        ends=named_ends(ends, FRINGE),
         across=(-STEP, HEIGHT),
-        region=narrow | BoxRegion((face, -STEP), (end, HEIGHT)),
+        region=narrow | BoxRegion((face, -STEP), (end if ends == "fringe" else np.inf, HEIGHT)),
         side=STEP,
         speed=1.5 * MEAN,
         inflow=inflow,
@@ -104,6 +107,7 @@ def backward_facing_step(
         scheme=SharpAtWalls() if scheme is None else scheme,
         dtype=dtype,
         parameters={
+            "ends": ends,
             "scale": scale,
             "reynolds": reynolds,
             "upstream": upstream,

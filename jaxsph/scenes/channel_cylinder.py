@@ -7,6 +7,7 @@ from ..kernels import Kernel
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, WallPart
 from .composed import pick_scale, positive
+from .ends import named_ends
 from .open_channel import open_channel
 from .scales import Scale
 from .scene import Scene
@@ -26,6 +27,7 @@ def channel_cylinder(
     resolution: int | None = None,
     reynolds: float = 20.0,
     *,
+    ends: str = "fringe",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -47,6 +49,7 @@ def channel_cylinder(
     Args:
         resolution: particles across; overrides the scale's, time step scaled along.
         reynolds: Reynolds number of mean speed and diameter.
+        ends: `fringe` or `openings`; what lies beyond the channel.
         scale: `small` (41 across), `half` (82) or `paper` (164).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -65,7 +68,7 @@ def channel_cylinder(
     return open_channel(
         "channel-cylinder",
         length=LENGTH,
-        fringe=FRINGE,
+        ends=named_ends(ends, FRINGE),
         height=HEIGHT,
         mean_speed=MEAN,
         obstacle=CYLINDER,
@@ -79,5 +82,5 @@ def channel_cylinder(
         kernel=kernel,
         scheme=SharpAtWalls() if scheme is None else scheme,
         dtype=dtype,
-        parameters={"scale": scale, "reynolds": reynolds},
+        parameters={"ends": ends, "scale": scale, "reynolds": reynolds},
     )

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..full_model import DENSITY_BOUNDS
 from ..pairs import Space
-from ..particles import ParticleState
 
 _FULL = 0.75  # of its room; a lattice in a small round vessel leaves some of it
 _RESOLVED = 2e-3  # of dx: a step moves a particle by some hundredths of dx
@@ -39,9 +38,9 @@ def check_resolved(position, space: Space) -> None:
         )
 
 
-def check_filled(state: ParticleState, space: Space, room: float | None) -> None:
-    """A ValueError if particles fill only a part of the room [m^n] that has no free surface."""
-    count = len(state.position)
+def check_filled(count: int, space: Space, room: float | None) -> None:
+    """A ValueError if so many particles fill only a part of the room [m^n] that has no free
+    surface."""
     if room is not None and count * space.cell_volume < _FULL * room:
         raise ValueError(
             f"particles: {count} of {space.cell_volume:.4g} m^{space.box.dim} each fill "

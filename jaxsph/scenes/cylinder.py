@@ -11,6 +11,7 @@ from ..kernels import Kernel
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, WallPart
 from .composed import pick_scale, positive
+from .ends import named_ends
 from .flow_through import flow_through
 from .scales import Scale
 from .scene import Scene
@@ -32,6 +33,7 @@ def cylinder(
     upstream: float = 5.0,
     downstream: float = 10.0,
     width: float = 10.0,
+    ends: str = "fringe",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -59,6 +61,7 @@ def cylinder(
         upstream: from the inflow to the cylinder's centre [m].
         downstream: from there to the outflow [m].
         width: of the box across the stream [m].
+        ends: `fringe` or `openings`; what lies beyond the channel.
         scale: `small` (10 a diameter), `half` (20) or `paper` (30).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -90,7 +93,7 @@ def cylinder(
     return flow_through(
         "cylinder",
         length=upstream + downstream,
-        fringe=FRINGE,
+        ends=named_ends(ends, FRINGE),
         across=(-0.5 * wide, 0.5 * wide),
         periodic=True,
         region=~body,
@@ -109,6 +112,7 @@ def cylinder(
         scheme=SharpAtWalls() if scheme is None else scheme,
         dtype=dtype,
         parameters={
+            "ends": ends,
             "scale": scale,
             "reynolds": reynolds,
             "upstream": upstream,

@@ -33,6 +33,7 @@ def enclosed_flow(
     side: float | None = None,
     moving: Sequence[MovingWall] = (),
     parts: Sequence[WallPart] = (),
+    opening: Region | None = None,
     force: BodyForce | None = None,
     wall_velocity: Effect | None = None,
     pressure: Callable | None = None,
@@ -59,6 +60,7 @@ def enclosed_flow(
         side: the length [m] that the resolution divides; the box's longest if none is given.
         moving: parts of the walls that slide along themselves.
         parts: of the walls, whose forces are recorded by name.
+        opening: where the fluid may reach past the box's faces.
         force: body force, if there is one.
         wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
@@ -86,7 +88,9 @@ def enclosed_flow(
         mach=mach,
         side=side,
         region=fluid_region,
-        walls=lambda space: Walls.around(fluid_region, space, moving, layers, parts=parts),
+        walls=lambda space: Walls.around(
+            fluid_region, space, moving, layers, parts=parts, opening=opening
+        ),
         pressure=pressure,
         arrangement=Lattice() if arrangement is None else arrangement,
         kernel=kernel,

@@ -14,6 +14,7 @@ from ..effects import ParabolicProfile
 from ..kernels import Kernel
 from ..schemes import Scheme
 from ..walls import BoxRegion, Region, WallPart
+from .ends import Ends
 from .flow_through import flow_through
 from .scales import Scale
 from .scene import Scene
@@ -24,7 +25,7 @@ def open_channel(
     name: str,
     *,
     length: float,
-    fringe: float,
+    ends: Ends,
     height: float,
     mean_speed: float,
     inflow: eqx.Module | None = None,
@@ -43,12 +44,12 @@ def open_channel(
     dtype: Any,
     parameters: dict[str, Any],
 ) -> Scene:
-    """A channel from x = 0 to `length` [m], flowed through; its box goes on by a `Fringe`.
+    """A channel from x = 0 to `length` [m], flowed through, with `Ends` beyond.
 
     Args:
         name: of the scene.
         length: of the channel [m].
-        fringe: least length of the fringe [m]; it ends where a row of particles does.
+        ends: of the flow: `FringeEnds(length)` or `OpenEnds()`.
         height: of the channel [m].
         mean_speed: of the inflow's parabola [m/s]; its peak, half as much again, is the speed that
             the Mach number is of: no inflow should be much faster.
@@ -70,7 +71,7 @@ def open_channel(
     return flow_through(
         name,
         length=length,
-        fringe=fringe,
+        ends=ends,
         across=(0.0, height),
         region=region if obstacle is None else region & ~obstacle,
         side=height,

@@ -12,6 +12,7 @@ from ..arrangements import Arrangement, JitteredLattice
 from ..kernels import Kernel
 from ..schemes import Scheme
 from .composed import pick_scale, positive
+from .ends import named_ends
 from .open_channel import open_channel
 from .scales import Scale
 from .scene import Scene
@@ -52,6 +53,7 @@ def poiseuille_open(
     resolution: int | None = None,
     reynolds: float = 10.0,
     *,
+    ends: str = "fringe",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -73,6 +75,7 @@ def poiseuille_open(
     Args:
         resolution: particles across; overrides the scale's, time step scaled along.
         reynolds: Reynolds number.
+        ends: `fringe` or `openings`; what lies beyond the channel.
         scale: `small` (20 across), `half` (40) or `paper` (80).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -91,7 +94,7 @@ def poiseuille_open(
     return open_channel(
         "poiseuille-open",
         length=LENGTH,
-        fringe=FRINGE,
+        ends=named_ends(ends, FRINGE),
         height=HEIGHT,
         mean_speed=MEAN,
         start=_plug,
@@ -105,5 +108,5 @@ def poiseuille_open(
         scheme=scheme,
         dtype=dtype,
         solution=OpenPoiseuilleFlow(1.0 / reynolds),
-        parameters={"scale": scale, "reynolds": reynolds},
+        parameters={"ends": ends, "scale": scale, "reynolds": reynolds},
     )

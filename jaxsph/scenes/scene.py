@@ -14,6 +14,7 @@ from ..full_model import CFL, FullModel
 from ..functional import SPHFunctional
 from ..neighbors import CAPACITY_MARGIN, NeighborSearch, WalledSearch
 from ..pairs import Space
+from ..parking import Parking, flowing
 from ..particles import ParticleState, in_dtype
 from ..schedule import Schedule
 from ..shown import concrete, line, table
@@ -79,18 +80,19 @@ class Scene(eqx.Module):
 
     def __check_init__(self):
         if self.walls is not None:
-            beyond = np.asarray(self.walls.beyond(self.state.position))
+            inside = flowing(self.state.position, self.parking)
+            beyond = np.asarray(self.walls.beyond(inside))
             if beyond.any():
                 first = int(np.argmax(beyond))
                 raise ValueError(
-                    f"particles: number {first} at {np.asarray(self.state.position[first])} m and "
+                    f"particles: number {first} at {np.asarray(inside[first])} m and "
                     f"{int(beyond.sum()) - 1} more start inside a wall; leave them out or move "
                     "the wall."
                 )
-            refuse_rows_at_walls(self.walls, self.state.position, self.space)
+            refuse_rows_at_walls(self.walls, inside, self.space)
         check_one_fluid(self.state.density, float(self.fluid.reference_density))
         check_resolved(self.state.position, self.space)
-        check_filled(self.state, self.space, self._room)
+        check_filled(self.flowing, self.space, self._room)
         limit = self.stable_time_step
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
@@ -160,7 +162,18 @@ class Scene(eqx.Module):
     def particle_volume(self) -> float:
         """Volume of a particle at rest [m^n]."""
         room = self._room
-        return self.space.cell_volume if room is None else room / len(self.state.position)
+        return self.space.cell_volume if room is None else room / self.flowing
+
+    @property
+    def flowing(self) -> int:
+        """Number of particles that are in the flow at the start, and not parked."""
+        return len(flowing(self.state.position, self.parking))
+
+    @property
+    def parking(self) -> Parking | None:
+        """Where particles wait that are in no flow; None where none come in or go out."""
+        places = (effect.parks_at() for effect in self.effects)
+        return next((place for place in places if place is not None), None)
 
     @property
     def _room(self) -> float | None:
@@ -213,7 +226,9 @@ class Scene(eqx.Module):
         box, support = self.space.box, self.space.support
         if self.walls is None:
             margin = CAPACITY_MARGIN if margin is None else margin
-            return NeighborSearch.allocate(state.position, box, support, skin, margin)
+            return NeighborSearch.allocate(
+                state.position, box, support, skin, margin, self.parking
+            )
         return WalledSearch.allocate(
             state.position,
             self.walls.position,
@@ -223,6 +238,7 @@ class Scene(eqx.Module):
             self.space.spacing,
             _WALL_MARGIN if margin is None else margin,
             moving=self.walls.bodies is not None,
+            parking=self.parking,
         )
 
     def model(self, state: ParticleState | None = None, margin: float | None = None) -> FullModel:

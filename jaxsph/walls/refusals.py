@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..pairs import Space
+from .region import Region
 
 _PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
 _TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
@@ -18,14 +19,16 @@ def place(point) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"
 
 
-def refuse_gaps(distance, space: Space) -> None:
-    """The fluid must not reach past a closed face of the box."""
+def refuse_gaps(distance, space: Space, opening: Region | None = None) -> None:
+    """The fluid must not reach past a closed face of the box, but where there is an opening."""
     box = space.box
     for axis, side in product(range(box.dim), (0, 1)):
         if box.periodic[axis]:
             continue
         face = _face(space, axis, (box.lower, box.upper)[side][axis])
         depth = distance(face)
+        if opening is not None:
+            depth = np.where(opening.signed_distance(jnp.asarray(face)) < space.spacing, 0.0, depth)
         if depth.min() < -_TOUCH * space.spacing:
             raise ValueError(
                 f"walls: a gap at {place(face[int(np.argmin(depth))])}: the fluid reaches past a "

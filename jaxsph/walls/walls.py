@@ -72,6 +72,7 @@ class Walls(eqx.Module):
         bodies: Sequence[MovingBody] = (),
         parts: Sequence[WallPart] = (),
         free_bodies: Sequence[FreeBody] = (),
+        opening: Region | None = None,
     ) -> Walls:
         """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
 
@@ -85,6 +86,8 @@ class Walls(eqx.Module):
                 the kernel's support deep into the region, and should stay that far in.
             parts: of the walls, moving bodies among them, whose forces are recorded by name.
             free_bodies: that the fluid moves, in two dimensions; as far from fixed walls as above.
+            opening: where the fluid may reach past the box's faces, through the buffers of
+                `jaxsph.effects.Openings`.
 
         Raises:
             ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
@@ -107,7 +110,7 @@ class Walls(eqx.Module):
         if layers < 1:
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
         distance = partial(_in_blocks, _distance, fluid_region)
-        refuse_gaps(distance, space)
+        refuse_gaps(distance, space, opening)
         refuse_torn_walls(distance, space)
         lattice = space.lattice(layers)
         depth = distance(lattice)

@@ -6,7 +6,7 @@ import pytest
 
 from jaxsph import BallRegion, BoxRegion
 from jaxsph.effects import UniformProfile
-from jaxsph.scenes import Scale, flow_through
+from jaxsph.scenes import FringeEnds, Scale, flow_through
 
 BODY = BallRegion((2.0, 0.0), 0.5)
 CHANNEL = BoxRegion((-np.inf, -1.5), (np.inf, 1.5))
@@ -16,7 +16,7 @@ def stream(region=~BODY, inflow=None, length=4.0, fringe=2.0, periodic=True):
     return flow_through(
         "stream",
         length=length,
-        fringe=fringe,
+        ends=FringeEnds(fringe),
         across=(-2.0, 2.0),
         periodic=periodic,
         region=region,

@@ -12,7 +12,7 @@ from jax import lax
 from jaxsph import run_scene
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.effects import Fringe, ParabolicProfile, Varying
-from jaxsph.scenes import Scale
+from jaxsph.scenes import FringeEnds, Scale
 from jaxsph.scenes.open_channel import open_channel
 
 NU, PERIOD = 0.1, 4.0  # m^2/s, s; height, peak speed and density are 1
@@ -42,7 +42,7 @@ def scene():
     return open_channel(
         "to-and-fro",
         length=1.5,
-        fringe=1.0,
+        ends=FringeEnds(1.0),
         height=1.0,
         mean_speed=2.0 / 3.0,
         inflow=ToAndFro(),

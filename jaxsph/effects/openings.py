@@ -1,0 +1,260 @@
+"""Openings, through which fluid comes in and goes out, each with a buffer of particles."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..parking import Parking
+from ..particles import ParticleState
+from ..ramps import ramp
+from .base import Effect
+
+_FRONT = 0.7  # of the way from the mouth to the reserve
+_LEAST = 1e-3  # particles in a cell that has a mean of its own
+_STABLE = 2.0  # over the rate; RK4 stands 2.78
+
+
+class Opening(eqx.Module):
+    """A part of the flow's border, and the buffer of particles behind it.
+
+    The buffer is a cuboid behind its mouth. In its front, next to the mouth, the fluid's own rates
+    of what the opening prescribes fade out: of the velocity at an inlet, of the density, by the
+    pressure, at an outlet. What it leaves open goes on by its own rates there; further back it
+    becomes the mean over the front, at each place across the mouth. The rear is the reserve, where
+    along each line across the mouth particles move as one: as many as start there come in again and
+    again. Through either kind of opening fluid may go both ways.
+
+    Args:
+        velocity: positions (N, n) [m] and a time [s] -> velocities (N, n) [m/s], the same
+            everywhere along a line across the mouth; an `eqx.Module`, smooth in time.
+        pressure: [Pa].
+        lower, upper: corners of the buffer [m] (static).
+        axis: along which fluid goes through (static).
+        inward: 1.0 if it comes in along that axis, -1.0 if against it (static).
+        reserve: length of the reserve [m], a whole number of particles; at least the kernel's
+            support and a half, so that those that come out of it miss none (static).
+        cell: width of the means over places across the mouth [m] (static).
+
+    Raises:
+        ValueError: if the corners span no cuboid or `inward` is no direction.
+    """
+
+    velocity: eqx.Module | None
+    pressure: Float[Array, ""] | None
+    lower: tuple[float, ...] = eqx.field(static=True)
+    upper: tuple[float, ...] = eqx.field(static=True)
+    axis: int = eqx.field(static=True)
+    inward: float = eqx.field(static=True)
+    reserve: float = eqx.field(static=True)
+    cell: float = eqx.field(static=True)
+
+    def __check_init__(self):
+        if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(f"opening: {self.upper} m must lie beyond {self.lower} m.")
+        if not 0.0 < self.reserve < self.length:
+            raise ValueError(
+                f"opening: a reserve of {self.reserve:g} m in a buffer of {self.length:g} m; let "
+                "it be a part of that."
+            )
+        if self.inward not in (-1.0, 1.0):
+            raise ValueError(f"opening: inward is 1.0 or -1.0, got {self.inward:g}.")
+
+    @property
+    def length(self) -> float:
+        """Of the buffer [m]."""
+        return self.upper[self.axis] - self.lower[self.axis]
+
+    @property
+    def before_reserve(self) -> float:
+        """Depth at which the reserve begins [m]."""
+        return self.length - self.reserve
+
+    def depth(self, position: Float[Array, "particles dim"]) -> Float[Array, " particles"]:
+        """How far behind the mouth [m]; negative in the flow."""
+        mouth = (self.lower, self.upper)[self.inward > 0.0][self.axis]
+        return self.inward * (mouth - position[:, self.axis])
+
+    def spans(self, position: Float[Array, "particles dim"]) -> Bool[Array, " particles"]:
+        """Whether a place lies on a line across the mouth."""
+        inside = jnp.ones(position.shape[0], bool)
+        for k in self._across:
+            x = position[:, k]
+            inside = inside & (x >= self.lower[k]) & (x <= self.upper[k])
+        return inside
+
+    def shares(
+        self, position: Float[Array, "particles dim"]
+    ) -> tuple[Float[Array, " particles"], Float[Array, " particles"]]:
+        """Of what the opening prescribes in the rates, and of what it takes from the front: 0 in
+        the flow, 1 in the reserve."""
+        way, inside = self.depth(position) / self.before_reserve, self.spans(position)
+        of_front, of_back = ramp(way, 0.0, _FRONT), ramp(way, _FRONT, 1.0)
+        return jnp.where(inside, of_front, 0.0), jnp.where(inside, of_back, 0.0)
+
+    def entering(self, position, since) -> Bool[Array, " particles"]:
+        """Which particles have come out of the reserve on their way from `since`."""
+        border = self.before_reserve
+        before, now = self.depth(since), self.depth(position)
+        return (before > border) & (now <= border) & self.spans(position)
+
+    def leaving(self, position) -> Bool[Array, " particles"]:
+        """Which particles have gone out at the end of the buffer."""
+        return (self.depth(position) > self.length) & self.spans(position)
+
+    def behind(self, position: Float[Array, "particles dim"]) -> Float[Array, "particles dim"]:
+        """Places a reserve's length further out [m]."""
+        return position.at[:, self.axis].add(-self.inward * self.reserve)
+
+    def in_front(
+        self, position: Float[Array, "particles dim"], values: Float[Array, "particles fields"]
+    ) -> Float[Array, "particles fields"]:
+        """Values of the fluid in the front, at the places across the mouth of all particles.
+
+        Means over cells across the mouth, linear between them; the mean of all where one is empty.
+        """
+        depth = self.depth(position)
+        inside = self.spans(position) & (depth >= 0.0) & (depth <= _FRONT * self.before_reserve)
+        weighed = jnp.concatenate([values, jnp.ones_like(values[:, :1])], axis=1)
+        weighed = jnp.where(inside[:, None], weighed, 0.0)
+        first, *others = (self._hats(position[:, k], k) for k in self._across)
+        spread = weighed
+        for hats in others:
+            spread = (hats[:, :, None] * spread[:, None, :]).reshape(position.shape[0], -1)
+        total = (first.T @ spread).reshape(-1, weighed.shape[1])
+        mean = jnp.sum(total, axis=0)
+        mean = mean / jnp.maximum(mean[-1:], _LEAST)
+        known = total[:, -1:] > _LEAST
+        table = jnp.where(known, total / jnp.where(known, total[:, -1:], 1.0), mean[None])
+        found = first @ table.reshape(first.shape[1], -1)
+        for hats in reversed(others):
+            found = found.reshape(position.shape[0], hats.shape[1], -1)
+            found = jnp.sum(hats[:, :, None] * found, axis=1)
+        return found[:, :-1]
+
+    @property
+    def _across(self) -> tuple[int, ...]:
+        return tuple(k for k in range(len(self.lower)) if k != self.axis)
+
+    def _hats(self, x: Float[Array, " particles"], k: int) -> Float[Array, "particles cells"]:
+        """How much of each cell along an axis a place is, linear between their middles."""
+        length = self.upper[k] - self.lower[k]
+        count = max(1, round(length / self.cell))
+        along = jnp.clip((x - self.lower[k]) * (count / length) - 0.5, 0.0, count - 1.0)
+        apart = jnp.abs(along[:, None] - jnp.arange(count, dtype=x.dtype)[None])
+        return jnp.maximum(1.0 - apart, 0.0)
+
+
+class Openings(Effect):
+    """In the buffers of openings
+
+        du_i/dt = (1 - s_i) a_i + s_i [dU/dt - rate (u_i - U(x_i, t))],
+        drho_i/dt = (1 - q_i) r_i + q_i rate (R_i - rho_i),
+        dx_i/dt = u_i + (1 - s_i) (1 - q_i) d_i,
+
+    a_i, r_i and d_i what all other effects give; U the velocity and R the density of the
+    opening's pressure where it has one, or the means of the fluid in its front. The shares s and q
+    rise from 0 to 1 along the front for what is prescribed, behind it for what is not.
+
+    A particle that comes out of a reserve towards the flow is put in once more at the reserve's
+    end, with the fields it has; one that goes out at the end is parked. Both are done where a
+    neighbour list is made anew; the numbers of particles and of those parked hold what flows.
+    Derivatives are those of the flow with the same particles put in at the same times.
+
+    Args:
+        openings: as many as there are.
+        rate: [1/s], within the stability of the step.
+        parking: where particles wait that are in no flow (static).
+    """
+
+    openings: tuple[Opening, ...]
+    rate: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    parking: Parking = eqx.field(static=True)
+
+    def on_fixed_points(self):
+        raise ValueError(
+            "Openings: put particles in, which has no meaning on points that do not move; learn "
+            "from the flow with a Fringe."
+        )
+
+    def parks_at(self):
+        return self.parking
+
+    def step_limit(self, fluid, space):
+        acting = self.rate > 0.0
+        return jnp.where(acting, _STABLE / jnp.where(acting, self.rate, 1.0), jnp.inf)
+
+    def governed(self, context, fields, rates):
+        position, velocity, density = (fields[name] for name in ("position", "velocity", "density"))
+        drift = rates["position"] - velocity
+        for opening in self.openings:
+            prescribed, left_open = opening.shares(position)
+            known = opening.in_front(
+                position, jnp.concatenate([velocity, density[:, None]], axis=1)
+            )
+            wanted, change, own = known[:, :-1], jnp.zeros_like(velocity), left_open[:, None]
+            if opening.velocity is not None:
+                own = prescribed[:, None]
+                wanted, change = jax.jvp(
+                    lambda time, at=opening: at.velocity(position, time),
+                    (context.time,),
+                    (jnp.ones_like(context.time),),
+                )
+            held, share = known[:, -1], left_open
+            if opening.pressure is not None:
+                held, share = context.fluid.density(opening.pressure), prescribed
+            pull = change - self.rate * (velocity - wanted)
+            fill = self.rate * (held - density)
+            drift = (1.0 - own) * (1.0 - share[:, None]) * drift
+            rates = rates | {
+                "velocity": rates["velocity"] + own * (pull - rates["velocity"]),
+                "density": rates["density"] + share * (fill - rates["density"]),
+            }
+        flowing = ~self.parking.holds(position)
+        rates = rates | {"position": velocity + drift}
+        return {
+            name: jnp.where(flowing.reshape((-1,) + (1,) * (rate.ndim - 1)), rate, 0.0)
+            for name, rate in rates.items()
+        }
+
+    def exchanged(self, state, since, fluid):
+        position = state.position
+        entering, leaving, copied = self._crossing(position, since)
+        free = leaving | self.parking.holds(position)
+        count = position.shape[0]
+        numbers = jnp.arange(count, dtype=jnp.int32)
+        rank = jnp.cumsum(entering.astype(jnp.int32), dtype=jnp.int32) - 1
+        donors = jnp.zeros(count, jnp.int32)
+        donors = donors.at[jnp.where(entering, rank, count)].set(numbers, mode="drop")
+        rank = jnp.cumsum(free.astype(jnp.int32), dtype=jnp.int32) - 1
+        put_in = free & (rank < jnp.sum(entering, dtype=jnp.int32))
+        donor = donors[jnp.clip(rank, 0, count - 1)]
+        away = (leaving & ~put_in)[:, None]
+        place = jnp.asarray(self.parking.place, position.dtype)[None]
+        there = jnp.where(away, place, position)
+        still = jnp.where(away, 0.0, state.velocity)
+        rest = jnp.where(away[:, 0], fluid.reference_density, state.density)
+        return ParticleState(
+            jnp.where(put_in[:, None], copied[donor], there),
+            jnp.where(put_in[:, None], state.velocity[donor], still),
+            jnp.where(put_in, state.density[donor], rest),
+            state.bodies,
+        )
+
+    def exhausted(self, position, since):
+        entering, leaving, _ = self._crossing(position, since)
+        return jnp.sum(entering) > jnp.sum(leaving | self.parking.holds(position))
+
+    def _crossing(self, position, since):
+        """Which particles have come out of a reserve and which have left, and where those that are
+        put in for the first come to be."""
+        parked = self.parking.holds(position) | self.parking.holds(since)
+        entering, leaving, copied = jnp.zeros_like(parked), jnp.zeros_like(parked), position
+        for opening in self.openings:
+            own = opening.entering(position, since) & ~parked
+            copied = jnp.where(own[:, None], opening.behind(position), copied)
+            entering = entering | own
+            leaving = leaving | (opening.leaving(position) & ~parked)
+        return entering, leaving, copied
