@@ -29,7 +29,7 @@ from jaxsph.scenes.channel_cylinder import CYLINDER, DIAMETER, HEIGHT, LENGTH, M
 from .measure import format_rows, number, progress
 from .table import Table, command
 
-KEY = ("resolution", "h_over_dx", "mach", "end_time")
+KEY = ("resolution", "ends", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # at Re = 20; pascals
     "drag": (5.57, 5.59), "lift": (0.0104, 0.0110), "pressure_difference": (0.1172, 0.1176)
 }  # fmt: skip
@@ -46,6 +46,7 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[33, 41, 66], metavar="N",
         help="particles across the channel, 4.1 times those across the cylinder")  # fmt: skip
+    add("--ends", choices=("fringe", "openings"), default="fringe", help="default: fringe")
     add("--h-over-dx", type=positive_float, default=1.5, metavar="X", help="default: 1.5")
     add("--mach", type=positive_float, default=0.1, metavar="M", help="default: 0.1")
     add("--t-end", type=positive_float, default=5.0, metavar="T", help="default: 5 s")
@@ -53,7 +54,7 @@ def _arguments(add) -> None:
 
 def _run(options) -> None:
     kept = Table(options.json, KEY, beside=lambda rows: {"literature": LITERATURE})
-    shared = (options.h_over_dx, options.mach, options.t_end)
+    shared = (options.ends, options.h_over_dx, options.mach, options.t_end)
     cases = (dict(zip(KEY, (n, *shared), strict=True)) for n in options.resolutions)
     for case in kept.left(cases):
         kept.add(case | run(case))
@@ -68,6 +69,7 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     """Coefficients, and what they took."""
     scene = channel_cylinder(
         case["resolution"],
+        ends=case["ends"],
         h_over_dx=case["h_over_dx"],
         mach=case["mach"],
         end_time=case["end_time"],
@@ -113,7 +115,8 @@ def pressure_difference(space, trajectory, late) -> float:
     found = []
     for k in np.flatnonzero(late):
         pressure = jnp.asarray(trajectory.pressure[k])[:, None]
-        values, overflow = there(jnp.asarray(trajectory.position[k]), pressure)
+        active = None if trajectory.active is None else jnp.asarray(trajectory.active[k])
+        values, overflow = there(jnp.asarray(trajectory.position[k]), pressure, active)
         found.append(np.nan if overflow else float(values[0, 0] - values[1, 0]))
     return float(np.mean(found))
 

@@ -27,7 +27,7 @@ from .open_flows import last_turn, mean_along, ran
 from .table import Table, command
 from .wake_runs import harmonic
 
-KEY = ("reynolds", "resolution", "width", "upstream", "h_over_dx", "mach", "end_time")
+KEY = ("reynolds", "ends", "resolution", "width", "upstream", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # of a single cylinder
     20: {"drag": (2.00, 2.05), "wake_length": (0.90, 0.94)},
     40: {"drag": (1.50, 1.55), "wake_length": (2.1, 2.3)},
@@ -48,6 +48,7 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--reynolds", type=positive_float, nargs="+", default=[20.0, 40.0, 100.0, 200.0],
         metavar="RE", help="default: 20 40 100 200")  # fmt: skip
+    add("--ends", choices=("fringe", "openings"), default="fringe", help="default: fringe")
     add("--resolutions", type=positive_int, nargs="+", default=[10], metavar="N",
         help="particles a diameter (default: 10)")  # fmt: skip
     add("--widths", type=positive_float, nargs="+", default=[10.0], metavar="W",
@@ -68,7 +69,7 @@ def _run(options) -> bool:
         end = options.t_end or END_TIME[re > SHEDS]
         if re > SHEDS and end < SHORTEST:
             raise ValueError(f"--t-end: at least {SHORTEST:g} s, or lift cannot be seen to swing.")
-        values = (re, n, width, ahead, options.h_over_dx, options.mach, end)
+        values = (re, options.ends, n, width, ahead, options.h_over_dx, options.mach, end)
         cases.append(dict(zip(KEY, values, strict=True)))
     for case in kept.left(cases):
         kept.add(case | run(case))
@@ -79,7 +80,7 @@ def _run(options) -> bool:
 def run(case: dict[str, Any]) -> dict[str, Any]:
     """A run's coefficients, and what they took."""
     reynolds, resolution = case["reynolds"], case["resolution"]
-    others = {name: case[name] for name in KEY[2:]}
+    others = {name: case[name] for name in KEY if name not in ("reynolds", "resolution")}
     scene = cylinder(resolution, reynolds, **others)
     trajectory, row = ran(scene, f"Re {reynolds:g}, {resolution} a diameter")
     if row["fault"]:
@@ -117,10 +118,10 @@ def wake_length(scene, trajectory, late) -> float:
 
 
 def _table(rows) -> str:
-    head = ("Re", "a diameter", "width", "ahead", "drag", "lift", "Strouhal", "wake", "seconds")
+    head = ("Re", "ends", "a diameter", "width", "ahead", "drag", "lift", "Strouhal", "wake", "seconds")
     names = ("drag", "lift_amplitude", "strouhal", "wake_length", "seconds")
     found = [
-        (number(r["reynolds"]), str(r["resolution"]), number(r["width"]), number(r["upstream"]),
+        (number(r["reynolds"]), r["ends"], str(r["resolution"]), number(r["width"]), number(r["upstream"]),
          *(number(r.get(name), 4) for name in names)) for r in rows
     ]  # fmt: skip
     return format_rows(head, found)

@@ -49,7 +49,9 @@ def mean_along(
     along = []
     for k in np.flatnonzero(of):
         values, overflow = there(
-            jnp.asarray(trajectory.position[k]), jnp.asarray(trajectory.velocity[k][:, :1])
+            jnp.asarray(trajectory.position[k]),
+            jnp.asarray(trajectory.velocity[k][:, :1]),
+            None if trajectory.active is None else jnp.asarray(trajectory.active[k]),
         )
         along.append(np.full(len(points), np.nan) if overflow else np.asarray(values)[:, 0])
     return np.mean(along, axis=0)

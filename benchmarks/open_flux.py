@@ -30,7 +30,7 @@ from .measure import format_rows, number
 from .open_flows import ran
 from .table import Table, command
 
-KEY = ("resolution", "mach", "reynolds", "end_time", "settled")
+KEY = ("resolution", "ends", "mach", "reynolds", "end_time", "settled")
 REYNOLDS = 10.0
 SECTIONS = 9  # in the channel, evenly, from a tenth of it to nine tenths
 EACH = 5  # steps from snapshot to snapshot, or fewer
@@ -45,6 +45,7 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[20], metavar="N",
         help="particles across (default: 20)")  # fmt: skip
+    add("--ends", choices=("fringe", "openings"), default="fringe", help="default: fringe")
     add("--machs", type=positive_float, nargs="+", default=[0.05, 0.025], metavar="M",
         help="default: 0.05 0.025")  # fmt: skip
     add("--t-end", type=positive_float, default=8.0, metavar="T", help="default: 8 s")
@@ -58,7 +59,7 @@ def _run(options) -> bool:
     kept = Table(options.json, KEY)
     cases = (
         dict(zip(KEY, (*case, REYNOLDS, options.t_end, options.settled), strict=True))
-        for case in product(options.resolutions, options.machs)
+        for case in product(options.resolutions, [options.ends], options.machs)
     )
     for case in kept.left(cases):
         kept.add(case | run(case))
@@ -95,6 +96,7 @@ def make_scene(case: dict[str, Any]) -> Scene:
     scene = poiseuille_open(
         case["resolution"],
         case["reynolds"],
+        ends=case["ends"],
         mach=case["mach"],
         end_time=case["end_time"],
         time_step=case["end_time"] / steps,
@@ -116,12 +118,17 @@ def passing(
     length = scene.space.box.lengths[0]
     x, density = trajectory.position[late][..., 0], trajectory.density[late]
     way = np.diff(x, axis=0)
-    way -= length * np.round(way / length)  # the box is periodic; none goes half around it
+    wraps = length * np.round(way / length)  # none goes half around the box
+    periodic = scene.space.box.periodic[0]
+    way -= wraps if periodic else 0.0
+    stayed = periodic | (wraps == 0.0)  # what is put in or parked passes no section
     found = np.zeros((2, len(sections)))
     for where, section in enumerate(sections):
-        before = (x[:-1] - section + 0.5 * length) % length - 0.5 * length  # nearest image
+        before = x[:-1] - section
+        if periodic:
+            before = (before + 0.5 * length) % length - 0.5 * length  # nearest image
         after = before + way
-        there = (before < 0.0) != (after < 0.0)
+        there = stayed & ((before < 0.0) != (after < 0.0))
         share = -before[there] / way[there]
         step, who = np.nonzero(there)
         when = time[step] + share * (time[step + 1] - time[step])
@@ -133,10 +140,10 @@ def passing(
 
 
 def _table(rows) -> str:
-    head = ("across", "Mach", "mass off", "lost on the way", "volume off", "compressed", "seconds")
+    head = ("across", "ends", "Mach", "mass off", "lost on the way", "volume off", "compressed", "seconds")
     names = ("mass_off", "mass_lost_on_the_way", "volume_off", "compressed", "seconds")
     found = [
-        (str(row["resolution"]), number(row["mach"]), *(number(row.get(n), 2) for n in names))
+        (str(row["resolution"]), row["ends"], number(row["mach"]), *(number(row.get(n), 2) for n in names))
         for row in rows
     ]
     return format_rows(head, found)

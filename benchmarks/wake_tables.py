@@ -7,11 +7,12 @@ from .table_text import markdown, results, short
 
 def cylinder_wake() -> str:
     """Coefficients by Reynolds number, resolution and width of the stream."""
-    header = ("Re", "particles a diameter", "cylinders apart [D]", "stream ahead [D]",
+    header = ("Re", "ends", "particles a diameter", "cylinders apart [D]", "stream ahead [D]",
               "drag", "lift amplitude", "Strouhal", "wake [D]", "steps", "run [s]")  # fmt: skip
     rows = [
         (
             short(row["reynolds"], 3),
+            row["ends"],
             str(row["resolution"]),
             f"{row['width']:g}",
             f"{row['upstream']:g}",
@@ -25,7 +26,7 @@ def cylinder_wake() -> str:
         )
         for row in sorted(
             results("cylinder_wake"),
-            key=lambda row: (row["reynolds"], row["upstream"], row["width"], row["resolution"]),
+            key=lambda row: (row["reynolds"], row["ends"], row["upstream"], row["width"], row["resolution"]),
         )
         if row["fault"] is None
     ]
@@ -90,17 +91,20 @@ def wake_models() -> str:
 
 def open_flux() -> str:
     """What flows through the sections of an open channel, beside what flows in."""
-    header = ("particles across", "Mach", "compressed from end to end", "mass off",
+    header = ("particles across", "ends", "Mach", "compressed from end to end", "mass off",
               "mass, section to section", "volume off", "run [s]")  # fmt: skip
     names = ("compressed", "mass_off", "mass_lost_on_the_way", "volume_off")
     rows = [
         (
             str(row["resolution"]),
+            row["ends"],
             f"{row['mach']:g}",
             *(f"{short(100.0 * row[name])} %" for name in names),
             f"{row['seconds']:.0f}",
         )
-        for row in sorted(results("open_flux"), key=lambda row: (row["resolution"], -row["mach"]))
+        for row in sorted(
+            results("open_flux"), key=lambda row: (row["ends"], row["resolution"], -row["mach"])
+        )
         if row["fault"] is None
     ]
     return markdown(header, rows)

@@ -47,7 +47,7 @@ class Clumping:
 
     def __call__(self, time: float, snapshot: Snapshot) -> str | None:
         """What is wrong with a snapshot, if particles have clumped."""
-        apart = nearest(snapshot.position, self.space.box) / self.space.spacing
+        apart = nearest(snapshot.in_flow().position, self.space.box) / self.space.spacing
         if apart >= CLUMPED:
             return None
         width = self.space.smoothing_length / self.space.spacing

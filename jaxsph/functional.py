@@ -125,7 +125,9 @@ class SPHFunctional(eqx.Module):
         """What its effects may know at a time [s], with walls and pairs of the fluid if given."""
         bodies = None if walls is None else walls.bodies
         forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
-        return Context(time, self.fluid, self.mass, self.space, bodies, forces, pairs)
+        parks = (effect.parks_at() for effect in self.effects)
+        parking = next((place for place in parks if place is not None), None)
+        return Context(time, self.fluid, self.mass, self.space, bodies, forces, parking, pairs)
 
     def walls_then(self, context: Context) -> Walls:
         """The walls where they are in a context of this functional."""

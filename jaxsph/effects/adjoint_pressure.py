@@ -134,7 +134,7 @@ class AdjointPressure(Effect):
     adjoints follow: what ghosts gather of their neighbours goes back to these by the same w_gk.
 
     A uniform pressure does nothing to a fluid that fills its box: p is taken less its mean, and D
-    less its own. Where a body force has a potential Phi, p is taken less the pressure of the fluid
+    less its own, unless fluid comes in and goes out through `Openings`. Where a body force has a potential Phi, p is taken less the pressure of the fluid
     at rest in it, of enthalpy C - Phi_i with C the mean of a particle's own enthalpy plus Phi, and
     that pressure's force -b rho_rest / rho_i added in closed form; so a fluid at rest stays there.
 
@@ -236,7 +236,8 @@ class AdjointPressure(Effect):
         )
         gradient = gradient + (1.0 - fields["smoothing"]) * excess + handed["handed_force"]
         divergence = sums["smooth_divergence"] + sharp * sums["rough_divergence"]
-        divergence = divergence - jnp.sum(volume * divergence) / jnp.sum(volume)
+        if context.parking is None:
+            divergence = divergence - _mean(context, fields, divergence)
         velocity = -gradient / density[:, None]
         if "balanced_force" in fields:
             velocity = velocity - fields["balanced_force"]
@@ -246,10 +247,10 @@ class AdjointPressure(Effect):
         """What the pressure that is taken out, the mean and that at rest, does to the walls."""
         rest, pressure = _Rest.of(context, fields), fields["pressure"]
         if not rest.forces:
-            mean = jnp.broadcast_to(_mean(pressure, fields), surface.points.shape[:1])
+            mean = jnp.broadcast_to(_mean(context, fields, pressure), surface.points.shape[:1])
             return surface.pressed(mean, jnp.zeros_like(fields["velocity"][0]))
         density, there = rest.density(fields["position"]), rest.density(surface.points)
-        mean = _mean(pressure - context.fluid.pressure(density), fields)
+        mean = _mean(context, fields, pressure - context.fluid.pressure(density))
         weight = context.mass * jnp.sum(rest.force_per_mass(density, fields), axis=0)
         return surface.pressed(context.fluid.pressure(there) + mean, weight)
 
@@ -263,11 +264,14 @@ def _acting_pressure(context, fields):
         density = rest.density(fields["position"])
         acting = acting - context.fluid.pressure(density)
         balance["balanced_force"] = rest.force_per_mass(density, fields)
-    return acting - _mean(acting, fields), balance
+    return acting - _mean(context, fields, acting), balance
 
 
-def _mean(values, fields):
+def _mean(context, fields, values):
+    """Over the volume of the fluid that is in the flow."""
     volume = fields["volume"]
+    if context.parking is not None:
+        volume = jnp.where(context.parking.holds(fields["position"]), 0.0, volume)
     return jnp.sum(volume * values) / jnp.sum(volume)
 
 
@@ -291,7 +295,7 @@ class _Rest(NamedTuple):
         if not rest.forces:
             return rest
         total = context.fluid.enthalpy(fields["density"]) + rest.potential(fields["position"])
-        return rest._replace(level=_mean(total, fields))
+        return rest._replace(level=_mean(context, fields, total))
 
     def potential(self, position):
         return sum(force.potential(self.context.time, position) for force in self.forces)

@@ -27,6 +27,7 @@ class Context(NamedTuple):
     space: Space
     bodies: Bodies | None = None  # walls that move across themselves
     forces: tuple[Effect, ...] = ()  # the scene's body forces
+    parking: Parking | None = None  # where particles wait, if some come in and go out
     pairs: VerletList | None = None  # of the fluid, for an effect that needs a further sum
 
 

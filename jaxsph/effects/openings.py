@@ -31,6 +31,9 @@ class Opening(eqx.Module):
         velocity: positions (N, n) [m] and a time [s] -> velocities (N, n) [m/s], the same
             everywhere along a line across the mouth; an `eqx.Module`, smooth in time.
         pressure: [Pa].
+        pressure_rate: at which that pressure is come back to [1/s]; the slower, the less of the
+            sound that comes to the opening is thrown back (Rudy and Strikwerda 1980 take 0.3 c0
+            over the length of the flow).
         lower, upper: corners of the buffer [m] (static).
         axis: along which fluid goes through (static).
         inward: 1.0 if it comes in along that axis, -1.0 if against it (static).
@@ -44,6 +47,7 @@ class Opening(eqx.Module):
 
     velocity: eqx.Module | None
     pressure: Float[Array, ""] | None
+    pressure_rate: Float[Array, ""] | None
     lower: tuple[float, ...] = eqx.field(static=True)
     upper: tuple[float, ...] = eqx.field(static=True)
     axis: int = eqx.field(static=True)
@@ -59,6 +63,8 @@ class Opening(eqx.Module):
                 f"opening: a reserve of {self.reserve:g} m in a buffer of {self.length:g} m; let "
                 "it be a part of that."
             )
+        if (self.pressure is None) != (self.pressure_rate is None):
+            raise ValueError("opening: a pressure and its rate belong together; give both or none.")
         if self.inward not in (-1.0, 1.0):
             raise ValueError(f"opening: inward is 1.0 or -1.0, got {self.inward:g}.")
 
@@ -151,12 +157,15 @@ class Openings(Effect):
     """In the buffers of openings
 
         du_i/dt = (1 - s_i) a_i + s_i [dU/dt - rate (u_i - U(x_i, t))],
-        drho_i/dt = (1 - q_i) r_i + q_i rate (R_i - rho_i),
+        drho_i/dt = (1 - q_i) r_i + q_i rate (R_i - rho_i)  or, where a pressure is given,
+        drho_i/dt = (1 - q_i) r_i + q_i [(rho0 / c0) A_i + pressure_rate (R_i - rho_i)],
         dx_i/dt = u_i + (1 - s_i) (1 - q_i) d_i,
 
     a_i, r_i and d_i what all other effects give; U the velocity and R the density of the
-    opening's pressure where it has one, or the means of the fluid in its front. The shares s and q
-    rise from 0 to 1 along the front for what is prescribed, behind it for what is not.
+    opening's pressure where it has one, or the means of the fluid in its front; A the mean of a in
+    the front, outwards, by which a sound wave that goes out finds itself there and none comes back
+    (Poinsot and Lele 1992). The shares s and q rise from 0 to 1 along the front for what is
+    prescribed, behind it for what is not.
 
     A particle that comes out of a reserve towards the flow is put in once more at the reserve's
     end, with the fields it has; one that goes out at the end is parked. Both are done where a
@@ -188,13 +197,13 @@ class Openings(Effect):
 
     def governed(self, context, fields, rates):
         position, velocity, density = (fields[name] for name in ("position", "velocity", "density"))
-        drift = rates["position"] - velocity
+        drift, fluid = rates["position"] - velocity, context.fluid
         for opening in self.openings:
             prescribed, left_open = opening.shares(position)
-            known = opening.in_front(
-                position, jnp.concatenate([velocity, density[:, None]], axis=1)
-            )
-            wanted, change, own = known[:, :-1], jnp.zeros_like(velocity), left_open[:, None]
+            out = -opening.inward * rates["velocity"][:, opening.axis]
+            read = (velocity, density[:, None], out[:, None])
+            known = opening.in_front(position, jnp.concatenate(read, axis=1))
+            wanted, change, own = known[:, :-2], jnp.zeros_like(velocity), left_open[:, None]
             if opening.velocity is not None:
                 own = prescribed[:, None]
                 wanted, change = jax.jvp(
@@ -202,11 +211,12 @@ class Openings(Effect):
                     (context.time,),
                     (jnp.ones_like(context.time),),
                 )
-            held, share = known[:, -1], left_open
+            fill, share = self.rate * (known[:, -2] - density), left_open
             if opening.pressure is not None:
-                held, share = context.fluid.density(opening.pressure), prescribed
+                sound = (fluid.reference_density / fluid.sound_speed) * known[:, -1]
+                back = fluid.density(opening.pressure) - density
+                fill, share = sound + opening.pressure_rate * back, prescribed
             pull = change - self.rate * (velocity - wanted)
-            fill = self.rate * (held - density)
             drift = (1.0 - own) * (1.0 - share[:, None]) * drift
             rates = rates | {
                 "velocity": rates["velocity"] + own * (pull - rates["velocity"]),

@@ -22,6 +22,7 @@ from ..walls.walls import fill
 from .scene import Scene
 
 _RATE = 0.3  # of a fringe or a buffer, times h / c0: half of what the longest step stands
+_RETURN = 3.0  # of an outlet's pressure, times c0 over the length of the flow
 _FRONT, _RESERVE = 1.4, 1.5  # times the kernel's support, from a mouth on and behind that
 
 
@@ -132,11 +133,11 @@ class OpenEnds(Ends):
         mouth = box.upper[0] + box.lower[0]
         sizes = {"axis": 0, "reserve": _rows(_RESERVE * space.support, space.spacing)}
         sizes["cell"] = space.spacing
-        inlet = Opening(
-            inflow, None, box.lower, (0.0, box.upper[1]), inward=1.0, **sizes
-        )
+        inlet = Opening(inflow, None, None, box.lower, (0.0, box.upper[1]), inward=1.0, **sizes)
+        corners = (mouth, box.lower[1]), box.upper
+        returning = _RETURN * scene.fluid.sound_speed / length
         outlet = Opening(
-            None, jnp.asarray(self.pressure), (mouth, box.lower[1]), box.upper, inward=-1.0, **sizes
+            None, jnp.asarray(self.pressure), returning, *corners, inward=-1.0, **sizes
         )
         ends = Openings((inlet, outlet), _rate(scene), Parking(box))
         return put_at_openings(scene, ends, region, self.spare * len(state.position))

@@ -1,0 +1,286 @@
+"""What comes in through openings and goes out: places, numbers, derivatives, what is parked."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxsph import Box, Fluid, ParticleState, SimulationError, run_scene
+from jaxsph.arrangements import Lattice
+from jaxsph.effects import FreeSlip, Opening, Openings, UniformProfile
+from jaxsph.integrate import FaultCode
+from jaxsph.io import read_snapshot, read_trajectory, snapshot_blocks
+from jaxsph.parking import Parking
+from jaxsph.scenes import OpenEnds, Scale, flow_through, poiseuille_open
+from jaxsph.walls import BoxRegion
+
+ACROSS = BoxRegion((-np.inf, 0.0), (np.inf, 1.0))
+
+
+def stream(ends=None, steps=40, dtype=None, speed=1.0, inflow=None):
+    """A plug between walls that slip, 8 across."""
+    return flow_through(
+        "plug",
+        length=1.5,
+        ends=OpenEnds() if ends is None else ends,
+        across=(0.0, 1.0),
+        region=ACROSS,
+        side=1.0,
+        speed=1.0,
+        inflow=UniformProfile(speed) if inflow is None else inflow,
+        viscosity=0.1,
+        scale=Scale(8, 1.5, 0.0125, 10),
+        mach=0.1,
+        end_time=0.0125 * steps,
+        arrangement=Lattice(),
+        wall_velocity=FreeSlip(),
+        dtype=dtype,
+        parameters={},
+    )
+
+
+@pytest.fixture(scope="module")
+def plug():
+    scene = stream()
+    return scene, run_scene(scene)
+
+
+def openings_of(scene):
+    (effect,) = (e for e in scene.effects if isinstance(e, Openings))
+    return effect
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_plug_goes_through_as_it_came_in(plug, dtype):
+    scene, flow = plug
+    if dtype == "float32":
+        scene = stream(dtype=dtype)
+        flow = run_scene(scene)
+    round_off = 1e-12 if dtype == "float64" else 1e-5
+    assert flow.velocity.dtype == dtype
+    for k, time in enumerate(flow.time):
+        there = flow.active[k]
+        u = flow.velocity[k][there]
+        np.testing.assert_allclose(u, np.broadcast_to([1.0, 0.0], u.shape), atol=round_off)
+        np.testing.assert_allclose(flow.density[k][there], 1.0, atol=round_off)
+        # columns a spacing apart all along the box, whatever has been put in and parked by then
+        x = np.sort(flow.position[k][there][:, 0]).reshape(-1, 8)
+        np.testing.assert_allclose(np.ptp(x, axis=1), 0.0, atol=round_off)
+        np.testing.assert_allclose(np.diff(x[:, 0]), 0.125, atol=round_off)
+        assert x[0, 0] < scene.space.box.lower[0] + 0.125 + time * 1e-9
+    assert (flow.active.sum(axis=1) < flow.particles).all()
+
+
+def test_parked_particles_stay_where_they_are(plug):
+    scene, flow = plug
+    place = openings_of(scene).parking.place
+    for k in range(len(flow.time)):
+        away = ~flow.active[k]
+        there = flow.position[k][away]
+        np.testing.assert_array_equal(there, np.broadcast_to(place, there.shape))
+        assert not flow.velocity[k][away].any() and (flow.density[k][away] == 1.0).all()
+    came_back = np.diff(flow.position[:, :, 0], axis=0) < -0.5  # at the inlet, from the outlet
+    assert came_back.any()
+
+
+def test_nobody_is_a_neighbour_of_what_is_parked():
+    scene = stream()
+    position = scene.state.position
+    search = scene.search()
+    fewer = dataclasses.replace(
+        scene, state=jax.tree.map(lambda a: a[: scene.flowing], scene.state)
+    ).search()
+    assert (search.fluid.capacity, search.capacity) == (fewer.fluid.capacity, fewer.capacity)
+    built = search.build(position)
+    own = np.arange(len(position))[:, None]
+    listed = np.asarray(built.fluid.index) != own
+    parked = np.asarray(scene.parking.holds(position))[np.asarray(built.fluid.order)]
+    assert parked.any() and not listed[parked].any() and listed[~parked].any(axis=1).all()
+    assert not parked[np.asarray(built.fluid.index)[~parked]].any()
+    assert not bool(built.overflow)
+
+
+def an_opening(inward=1.0, axis=0, dim=2, **conditions):
+    lower, upper = [0.0] * dim, [1.0] * dim
+    lower[axis], upper[axis] = 2.0, 3.0
+    settings = {"velocity": None, "pressure": None, "pressure_rate": None, "reserve": 0.5, "cell": 0.25} | conditions
+    return Opening(lower=tuple(lower), upper=tuple(upper), axis=axis, inward=inward, **settings)
+
+
+@pytest.mark.parametrize("inward, mouth", [(1.0, 3.0), (-1.0, 2.0)])
+@pytest.mark.parametrize("axis, dim", [(0, 2), (1, 2), (2, 3)])
+def test_depths_shares_and_borders(inward, mouth, axis, dim):
+    opening = an_opening(inward, axis, dim)
+
+    def at(depth, across=0.5):
+        place = np.full((1, dim), across)
+        place[0, axis] = mouth - inward * depth
+        return jnp.asarray(place)
+
+    assert float(opening.depth(at(0.3))[0]) == pytest.approx(0.3)
+    np.testing.assert_allclose(opening.behind(at(0.3)), at(0.8))
+    for depth, prescribed, left_open in ((-0.1, 0, 0), (0.35, 1, 0), (0.5, 1, 1), (0.9, 1, 1)):
+        shares = opening.shares(at(depth))
+        assert [float(share[0]) for share in shares] == pytest.approx([prescribed, left_open])
+        assert not any(float(share[0]) for share in opening.shares(at(depth, across=1.2)))
+    assert bool(opening.entering(at(0.49), at(0.51))[0])
+    assert not bool(opening.entering(at(0.51), at(0.49))[0])
+    assert not bool(opening.entering(at(0.49, 1.2), at(0.51, 1.2))[0])
+    assert bool(opening.leaving(at(1.01))[0]) and not bool(opening.leaving(at(0.99))[0])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_front_is_read_by_places_across_the_mouth(dim):
+    """Means over cells of a linear field are that field away from the mouth's rim."""
+    opening = an_opening(dim=dim, cell=0.125)
+    ticks = (np.arange(16) + 0.5) / 16.0
+    along = 3.0 - 0.35 * ticks[::4]  # four columns in the front
+    position = np.stack(np.meshgrid(along, *[ticks] * (dim - 1), indexing="ij"), axis=-1)
+    position = jnp.asarray(position.reshape(-1, dim))
+    slope = jnp.arange(1.0, dim)
+    linear = jnp.sum(position[:, 1:] * slope[None], axis=1)
+    values = jnp.stack([linear, jnp.full_like(linear, 7.0)], axis=1)
+    found = opening.in_front(position, values)
+    inner = np.all(np.abs(np.asarray(position[:, 1:]) - 0.5) < 0.3, axis=1)
+    assert inner.any()
+    np.testing.assert_allclose(found[inner, 0], linear[inner], atol=1e-12)
+    np.testing.assert_allclose(found[:, 1], 7.0, atol=1e-12)
+    # where no particle is in the front, nothing is not a number
+    nobody = opening.in_front(position.at[:, 0].add(-3.0), values)
+    assert bool(jnp.all(jnp.isfinite(nobody)))
+
+
+def exchange(position, since, parked=2, velocity=None):
+    """Particles on their way past two openings, and so many parked."""
+    box = Box((0.0, 0.0), (4.0, 1.0), (False, False))
+    sides = [
+        Opening(None, None, None, (0.0, 0.0), (1.0, 1.0), 0, 1.0, 0.5, 0.25),
+        Opening(None, jnp.zeros(()), jnp.ones(()), (3.0, 0.0), (4.0, 1.0), 0, -1.0, 0.5, 0.25),
+    ]
+    effect = Openings(tuple(sides), 1.0, Parking(box))
+    place = jnp.broadcast_to(jnp.asarray(effect.parking.place), (parked, 2))
+    position, since = (jnp.concatenate([jnp.asarray(x), place]) for x in (position, since))
+    count = len(position)
+    speed = jnp.arange(2.0 * count).reshape(count, 2) if velocity is None else velocity
+    state = ParticleState(position, speed, 1.0 + 0.01 * jnp.arange(float(count)))
+    fluid = Fluid(jnp.asarray(1.0), jnp.asarray(10.0), jnp.asarray(1.0))
+    return effect, state, since, effect.exchanged(state, since, fluid)
+
+
+def test_what_comes_out_of_a_reserve_is_put_in_once_more_behind_it():
+    since = [[0.45, 0.2], [0.48, 0.7], [2.0, 0.5], [3.95, 0.4]]
+    now = [[0.55, 0.2], [0.49, 0.7], [2.1, 0.5], [4.05, 0.4]]
+    effect, old, at, new = exchange(now, since)
+    np.testing.assert_allclose(new.position[:3], now[:3])
+    # the first place that is free is that of the one that left
+    np.testing.assert_allclose(new.position[3], [0.05, 0.2])
+    np.testing.assert_array_equal(new.velocity[3], old.velocity[0])
+    assert float(new.density[3]) == float(old.density[0])
+    assert effect.parking.holds(new.position).tolist() == [False] * 4 + [True] * 2
+    assert not bool(effect.exhausted(old.position, at))
+    # and back again: through the outlet in, out at the inlet's end
+    effect, old, at, new = exchange([[3.45, 0.3], [-0.1, 0.6]], [[3.55, 0.3], [0.1, 0.6]], 0)
+    np.testing.assert_allclose(new.position, [[3.45, 0.3], [3.95, 0.3]])
+
+
+def test_none_parked_is_a_fault_with_its_name():
+    came = ([[0.55, 0.2], [0.55, 0.6]], [[0.45, 0.2], [0.45, 0.6]])
+    effect, old, at, _ = exchange(*came, parked=1)
+    assert bool(effect.exhausted(old.position, at))
+    effect, old, at, _ = exchange(*came, parked=2)
+    assert not bool(effect.exhausted(old.position, at))
+    # a column comes in before one has gone out
+    scene = stream(OpenEnds(spare=0.0), steps=10)
+    outlet = openings_of(scene).openings[1]
+    first = scene.state.position[:, 0] < outlet.upper[0] - 0.13  # the last column is not there yet
+    shorter = dataclasses.replace(scene, state=jax.tree.map(lambda a: a[first], scene.state))
+    with pytest.raises(SimulationError, match="more particles come in .* than are parked; park more"):
+        run_scene(shorter)
+
+
+def test_a_run_taken_up_again_is_the_unbroken_one(plug, tmp_path):
+    scene, flow = plug
+    path = tmp_path / "run.h5"
+
+    class Killed(Exception):
+        pass
+
+    def kill(steps, done=[0]):  # noqa: B006
+        done[0] += steps
+        if done[0] >= scene.steps // 2:
+            raise Killed
+
+    with pytest.raises(Killed):
+        run_scene(scene, path, progress=kill)
+    taken_up = run_scene(scene, path)
+    for name in ("position", "velocity", "density", "active"):
+        np.testing.assert_array_equal(getattr(taken_up, name), getattr(flow, name))
+    # and files know who is in the flow
+    stored = read_trajectory(path)
+    np.testing.assert_array_equal(stored.active, flow.active)
+    np.testing.assert_array_equal(
+        np.concatenate([block.active for block in snapshot_blocks(path, 2)]), flow.active
+    )
+    _, last = read_snapshot(path)
+    shown = last.in_flow()
+    assert len(shown.position) == flow.active[-1].sum() and shown.active is None
+    assert shown.position[:, 0].min() > scene.space.box.lower[0] - 0.1
+
+
+def test_derivatives_are_those_of_the_flow():
+    """The mean speed in a channel by the inflow's, forward and reverse, beside differences."""
+    scene = poiseuille_open(8, ends="openings", h_over_dx=1.5, end_time=0.05)
+    model, schedule = scene.model(), scene.schedule
+    number = [isinstance(e, Openings) for e in scene.effects].index(True)
+    within = jnp.abs(scene.state.position[:, 0] - 1.0) < 0.5
+
+    from jaxsph.integrate import integrate
+
+    def mean(peak):
+        ends = scene.effects[number]
+        inlet = dataclasses.replace(
+            ends.openings[0], velocity=dataclasses.replace(ends.openings[0].velocity, peak=peak)
+        )
+        changed = dataclasses.replace(ends, openings=(inlet, *ends.openings[1:]))
+        now = model.with_effect(changed)
+        state, fault, _, _ = integrate(
+            now, scene.state, jnp.asarray(0), jnp.asarray(schedule.time_step), schedule.steps, 1
+        )
+        weight = jnp.where(within, state.density, 0.0)
+        return jnp.sum(weight * state.velocity[:, 0]) / jnp.sum(weight), fault.code
+
+    def value(peak):
+        return mean(peak)[0]
+
+    here, step = jnp.asarray(1.0), 1e-4
+    assert int(jax.jit(mean)(here)[1]) == FaultCode.NONE
+    _, forward = jax.jit(lambda x: jax.jvp(value, (x,), (jnp.ones_like(x),)))(here)
+    reverse = jax.jit(jax.grad(value))(here)
+    both = jax.jit(jax.vmap(value))(jnp.asarray([1.0 - step, 1.0 + step]))  # a sweep, too
+    assert float(forward) != 0.0
+    assert float(reverse) == pytest.approx(float(forward), rel=1e-9)
+    assert float(both[1] - both[0]) / (2.0 * step) == pytest.approx(float(forward), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: an_opening(inward=0.5), "inward is 1.0 or -1.0, got 0.5"),
+        (lambda: an_opening(reserve=1.0), "a reserve of 1 m in a buffer of 1 m"),
+        (lambda: an_opening(pressure=jnp.zeros(())), "a pressure and its rate belong together"),
+        (lambda: OpenEnds(spare=-0.1), "spare: a share of at least 0, got -0.1"),
+        (lambda: Parking(Box.unit_periodic(2)), "periodic along axis 0, and has no outside"),
+        (lambda: poiseuille_open(12, ends="valve"), "ends: one of fringe, openings, got 'valve'"),
+    ],
+)
+def test_bad_openings_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_scenes_without_openings_know_nothing_of_them():
+    scene = poiseuille_open(12, end_time=0.1)
+    assert scene.parking is None and scene.flowing == len(scene.state.position)
+    assert scene.model().observe(scene.state).active is None
