@@ -118,11 +118,12 @@ def wake_length(scene, trajectory, late) -> float:
 
 
 def _table(rows) -> str:
-    head = ("Re", "ends", "a diameter", "width", "ahead", "drag", "lift", "Strouhal", "wake", "seconds")
+    head = ("Re", "ends", "a diameter", "width", "ahead",
+            "drag", "lift", "Strouhal", "wake", "seconds")  # fmt: skip
     names = ("drag", "lift_amplitude", "strouhal", "wake_length", "seconds")
     found = [
-        (number(r["reynolds"]), r["ends"], str(r["resolution"]), number(r["width"]), number(r["upstream"]),
-         *(number(r.get(name), 4) for name in names)) for r in rows
+        (number(r["reynolds"]), r["ends"], str(r["resolution"]), number(r["width"]),
+         number(r["upstream"]), *(number(r.get(name), 4) for name in names)) for r in rows
     ]  # fmt: skip
     return format_rows(head, found)
 

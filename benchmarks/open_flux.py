@@ -140,12 +140,14 @@ def passing(
 
 
 def _table(rows) -> str:
-    head = ("across", "ends", "Mach", "mass off", "lost on the way", "volume off", "compressed", "seconds")
+    head = ("across", "ends", "Mach",
+            "mass off", "lost on the way", "volume off", "compressed", "seconds")  # fmt: skip
     names = ("mass_off", "mass_lost_on_the_way", "volume_off", "compressed", "seconds")
     found = [
-        (str(row["resolution"]), row["ends"], number(row["mach"]), *(number(row.get(n), 2) for n in names))
+        (str(row["resolution"]), row["ends"], number(row["mach"]),
+         *(number(row.get(n), 2) for n in names))
         for row in rows
-    ]
+    ]  # fmt: skip
     return format_rows(head, found)
 
 

@@ -26,7 +26,9 @@ def cylinder_wake() -> str:
         )
         for row in sorted(
             results("cylinder_wake"),
-            key=lambda row: (row["reynolds"], row["ends"], row["upstream"], row["width"], row["resolution"]),
+            key=lambda row: tuple(
+                row[name] for name in ("reynolds", "ends", "upstream", "width", "resolution")
+            ),
         )
         if row["fault"] is None
     ]

@@ -134,9 +134,10 @@ class AdjointPressure(Effect):
     adjoints follow: what ghosts gather of their neighbours goes back to these by the same w_gk.
 
     A uniform pressure does nothing to a fluid that fills its box: p is taken less its mean, and D
-    less its own, unless fluid comes in and goes out through `Openings`. Where a body force has a potential Phi, p is taken less the pressure of the fluid
-    at rest in it, of enthalpy C - Phi_i with C the mean of a particle's own enthalpy plus Phi, and
-    that pressure's force -b rho_rest / rho_i added in closed form; so a fluid at rest stays there.
+    less its own, unless fluid comes in and goes out through `Openings`. Where a body force has a
+    potential Phi, p is taken less the pressure of the fluid at rest in it, of enthalpy C - Phi_i
+    with C the mean of a particle's own enthalpy plus Phi, and that pressure's force
+    -b rho_rest / rho_i added in closed form; so a fluid at rest stays there.
 
     Beside a wall S is a mean over one side. Where a flow meets a wall head-on and turns, it takes
     the fluid farther out for that at the wall. X S + 1 - X in place of S, X any diagonal, has the

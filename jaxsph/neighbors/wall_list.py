@@ -226,7 +226,8 @@ class WalledSearch(eqx.Module):
         near = np.asarray(position)[near]
         count = room if len(near) < _FILLED * room else len(near)  # fluid may flow there yet
         near_run = wall_grid.longest_run(of_ghosts, of_fluid)
-        ghost_run = wall_grid.longest_run(of_fluid, of_ghosts)
+        there = wall_grid.counts(jnp.asarray(reach_grid.centers, position.dtype), free)
+        ghost_run = wall_grid.longest_run(of_fluid + there, of_ghosts)  # wherever fluid may come
         more = max(margin, RUN_MARGIN) if moving else 1.0
         largest = max(
             most_around(box, ghosts, near, radius), most_around(box, near, ghosts, radius)

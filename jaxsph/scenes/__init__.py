@@ -16,6 +16,7 @@ from .enclosed import enclosed_flow as enclosed_flow
 from .ends import Ends as Ends
 from .ends import FringeEnds as FringeEnds
 from .ends import OpenEnds as OpenEnds
+from .filling_tank import filling_tank as filling_tank
 from .floating_box import floating_box as floating_box
 from .flow_through import flow_through as flow_through
 from .gresho_vortex import gresho_vortex as gresho_vortex
@@ -61,5 +62,6 @@ SCENES = {
     "sloshing": sloshing,
     "standing-wave": standing_wave,
     "floating-box": floating_box,
+    "filling-tank": filling_tank,
     "taylor-couette": taylor_couette,
 }

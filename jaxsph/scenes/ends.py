@@ -60,7 +60,14 @@ def named_ends(name: str, fringe: float) -> Ends:
     return known[name]
 
 
-def _rate(scene: Scene):
+def buffer_lengths(support: float, dx: float) -> tuple[float, float]:
+    """Lengths [m] of an opening's buffer in front of its reserve, and of that."""
+    front, reserve = (_rows(share * support, dx) for share in (_FRONT, _RESERVE))
+    return front, reserve
+
+
+def buffer_rate(scene: Scene):
+    """At which a fringe or a buffer takes a velocity to its own [1/s]."""
     return jnp.asarray(_RATE * float(scene.fluid.sound_speed) / scene.space.smoothing_length)
 
 
@@ -91,7 +98,7 @@ class FringeEnds(Ends):
 
     def close(self, scene, length, inflow, region):
         box, dx = scene.space.box, scene.space.spacing
-        held = Fringe(inflow, _rate(scene), length, box.upper[0])
+        held = Fringe(inflow, buffer_rate(scene), length, box.upper[0])
         _check_even(region, held, (box.lower[1], box.upper[1]), dx)
         return dataclasses.replace(scene, effects=(*scene.effects, held))
 
@@ -117,7 +124,7 @@ class OpenEnds(Ends):
             raise ValueError(f"spare: a share of at least 0, got {self.spare:g}.")
 
     def box(self, length, across, periodic, dx, support):
-        behind = sum(_rows(share * support, dx) for share in (_FRONT, _RESERVE))
+        behind = sum(buffer_lengths(support, dx))
         upper = _rows(length, dx) + behind
         return Box((-behind, across[0]), (upper, across[1]), (False, periodic))
 
@@ -131,15 +138,15 @@ class OpenEnds(Ends):
     def close(self, scene, length, inflow, region):
         space, box, state = scene.space, scene.space.box, scene.state
         mouth = box.upper[0] + box.lower[0]
-        sizes = {"axis": 0, "reserve": _rows(_RESERVE * space.support, space.spacing)}
-        sizes["cell"] = space.spacing
+        _, reserve = buffer_lengths(space.support, space.spacing)
+        sizes = {"axis": 0, "reserve": reserve, "cell": space.spacing}
         inlet = Opening(inflow, None, None, box.lower, (0.0, box.upper[1]), inward=1.0, **sizes)
         corners = (mouth, box.lower[1]), box.upper
         returning = _RETURN * scene.fluid.sound_speed / length
         outlet = Opening(
             None, jnp.asarray(self.pressure), returning, *corners, inward=-1.0, **sizes
         )
-        ends = Openings((inlet, outlet), _rate(scene), Parking(box))
+        ends = Openings((inlet, outlet), buffer_rate(scene), Parking(box))
         return put_at_openings(scene, ends, region, self.spare * len(state.position))
 
 

@@ -11,6 +11,7 @@ from ..pairs import Space
 from .region import Region
 
 _PITCH = 0.25  # times dx: at which the box's faces are searched for gaps
+_SEAM = 0.25  # times dx: so far beyond a seam
 _TOUCH = 1e-6  # times dx: round-off of a surface that lies in a face of the box
 
 
@@ -35,6 +36,27 @@ def refuse_gaps(distance, space: Space, opening: Region | None = None) -> None:
                 "closed face of its box there. Close it with a wall, widen the box, or make that "
                 "direction periodic."
             )
+
+
+def refuse_seams(distance, space: Space, cells, outward) -> None:
+    """Regions joined without an overlap leave a wall of no thickness between them.
+
+    Args:
+        distance: signed, of places (P, n) [m].
+        space: gives the spacing.
+        cells: places in the fluid, within a spacing of a wall [m].
+        outward: the distance's gradients there.
+    """
+    surface = cells - distance(cells)[:, None] * outward
+    beyond = surface + _SEAM * space.spacing * outward
+    seam = (np.abs(distance(surface)) < _TOUCH * space.spacing) & (
+        distance(beyond) < -0.9 * _SEAM * space.spacing
+    )
+    if seam.any():
+        raise ValueError(
+            f"walls: a wall of no thickness at {place(surface[int(np.argmax(seam))])}, where two "
+            "regions of fluid touch; let them overlap where they are joined."
+        )
 
 
 def refuse_torn_walls(distance, space: Space) -> None:

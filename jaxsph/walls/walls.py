@@ -20,7 +20,13 @@ from ..pairs import Space
 from .free_body import FreeBodies, FreeBody, checked
 from .moving_body import Bodies, MovingBody
 from .parts import WallPart
-from .refusals import place, refuse_gaps, refuse_thin_walls, refuse_torn_walls
+from .refusals import (
+    place,
+    refuse_gaps,
+    refuse_seams,
+    refuse_thin_walls,
+    refuse_torn_walls,
+)
 from .region import Region
 
 _POINTS = 4096  # at which a distance is evaluated at a time
@@ -116,6 +122,8 @@ class Walls(eqx.Module):
         depth = distance(lattice)
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
+        beside = lattice[(depth < 0.0) & (depth > -space.spacing)]
+        refuse_seams(distance, space, beside, _in_blocks(_gradient, fluid_region, beside))
         moved = (*bodies, *free_bodies)
         for body in free_bodies:
             checked(body, space.box)

@@ -105,8 +105,9 @@ def test_nobody_is_a_neighbour_of_what_is_parked():
 def an_opening(inward=1.0, axis=0, dim=2, **conditions):
     lower, upper = [0.0] * dim, [1.0] * dim
     lower[axis], upper[axis] = 2.0, 3.0
-    settings = {"velocity": None, "pressure": None, "pressure_rate": None, "reserve": 0.5, "cell": 0.25} | conditions
-    return Opening(lower=tuple(lower), upper=tuple(upper), axis=axis, inward=inward, **settings)
+    settings = {"velocity": None, "pressure": None, "pressure_rate": None}
+    settings |= {"reserve": 0.5, "cell": 0.25, "axis": axis, "inward": inward} | conditions
+    return Opening(lower=tuple(lower), upper=tuple(upper), **settings)
 
 
 @pytest.mark.parametrize("inward, mouth", [(1.0, 3.0), (-1.0, 2.0)])
@@ -196,7 +197,7 @@ def test_none_parked_is_a_fault_with_its_name():
     outlet = openings_of(scene).openings[1]
     first = scene.state.position[:, 0] < outlet.upper[0] - 0.13  # the last column is not there yet
     shorter = dataclasses.replace(scene, state=jax.tree.map(lambda a: a[first], scene.state))
-    with pytest.raises(SimulationError, match="more particles come in .* than are parked; park more"):
+    with pytest.raises(SimulationError, match="more particles come in .* than are parked; park"):
         run_scene(shorter)
 
 

@@ -29,6 +29,15 @@ def test_a_particle_moved_into_a_wall_is_refused_not_lost():
         lid_driven_cavity(12, arrangement=JitteredLattice(amplitude=0.8))
 
 
+def test_regions_that_touch_without_an_overlap_are_refused():
+    box = Box((-1.0, 0.0), (1.0, 1.0), (False, False))
+    space = Space(box, WendlandC2(), 0.1, 0.05)
+    tank, left = BoxRegion((0.0, 0.0), (1.0, 1.0)), BoxRegion((-1.0, 0.0), (0.0, 0.4))
+    with pytest.raises(ValueError, match=r"a wall of no thickness at \(0, .*let them overlap"):
+        Walls.around(tank | left, space)
+    Walls.around(tank | BoxRegion((-1.0, 0.0), (0.5, 0.4)), space)
+
+
 def test_an_open_cavity_that_does_not_fit_the_lattice_is_refused():
     with pytest.raises(ValueError, match="multiple of 4"):
         open_cavity(50)
