@@ -93,6 +93,8 @@ def near_walls(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     distance = jax.jit(lambda t, x: -walls.at(t).signed_distance(x) / dx)
     snapshots = zip(trajectory.time, trajectory.position, strict=True)
     over_dx = np.stack([distance(jnp.asarray(t, x.dtype), jnp.asarray(x)) for t, x in snapshots])
+    if trajectory.active is not None:
+        over_dx = np.where(trajectory.active, over_dx, np.inf)
     near = over_dx < 0.25
     longest, lasting = np.zeros(near.shape[1], int), np.zeros(near.shape[1], int)
     for row in near:

@@ -36,6 +36,7 @@ OPTIONS = {
     "poiseuille-open": "--resolution 20 --t-end 1",
     "sloshing": "--t-end 3",
     "piston-wave-maker": "--t-end 2.4",
+    "filling-tank": "--t-end 2",
     "floating-box": "--lift 0.08 --t-end 0.6",
     "taylor-couette": "--resolution 16 --t-end 0.5",
     "open-cavity": "--resolution 40 --t-end 0.5",

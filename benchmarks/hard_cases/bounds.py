@@ -134,5 +134,17 @@ CHANNEL = (DENSITY, CHANNEL_SPEED, WALLS, DISTANCE, EVEN)
 PULSED = (DENSITY, INFLOW_SPEED, WALLS, DISTANCE, EVEN)
 STOPPED = (*PULSED, AT_END)
 STRUCK = (LOOSE_DENSITY, FAST, WALLS, DISTANCE, EVEN)
+SWUNG = Bound(
+    "density", density_deviation, 0.05,
+    "an inflow that swings with w needs w U L / c0^2 = 0.02 over the channel and its buffers, and "
+    "half as much again where the outlet lets sound out",
+)  # fmt: skip
+GAINING = Bound(
+    "highest speed", highest_speed, 4.0,
+    "twice the inflow's speed on top of it at the start, and what a third more pressure inside "
+    "than at the outlet gives it",
+)  # fmt: skip
+THROUGH = (SWUNG, INFLOW_SPEED, WALLS, DISTANCE, EVEN)
+LEAVING = (LOOSE_DENSITY, GAINING, WALLS, DISTANCE, EVEN)
 TANK = (DENSITY, STILL, HYDROSTATIC, WALLS, DISTANCE, EVEN)
 SCATTERED = (LOOSE_DENSITY, FAST)

@@ -128,7 +128,7 @@ def _each(function, scene: Scene, trajectory: Trajectory):
     """A function of space and positions, at snapshots spread over the run."""
     count = len(trajectory.time)
     for k in np.unique(np.linspace(0, count - 1, min(count, _LOOKED_AT)).round().astype(int)):
-        yield function(scene.space, np.float64(trajectory.position[k]))
+        yield function(scene.space, np.float64(trajectory.snapshot(k).in_flow().position))
 
 
 def _nearest(space: Space, position: np.ndarray) -> Float[np.ndarray, " particles"]:

@@ -6,10 +6,11 @@ import dataclasses
 from collections.abc import Callable
 from functools import partial
 
+import jax
 import jax.numpy as jnp
 
 from jaxsph import BallRegion, WallPart
-from jaxsph.effects import Fringe, Varying
+from jaxsph.effects import Fringe, ParabolicProfile, Varying
 from jaxsph.integrate import FaultCode
 from jaxsph.scenes import (
     FringeEnds,
@@ -17,6 +18,7 @@ from jaxsph.scenes import (
     Scene,
     channel_cylinder,
     cylinder,
+    filling_tank,
     floating_box,
     poiseuille_open,
 )
@@ -24,24 +26,26 @@ from jaxsph.scenes.open_channel import open_channel
 from jaxsph.scenes.poiseuille_open import LENGTH
 from jaxsph.schemes import SharpAtWalls
 
-from .bounds import PULSED, STOPPED, STRUCK
+from .bounds import LEAVING, PULSED, STOPPED, STRUCK, THROUGH
 from .full_cases import about
 from .judge import Case, Ending, Run
 
 
-def _channel(factor: Callable, end_time: float, precision: str) -> Run:
-    scene = poiseuille_open(12, h_over_dx=1.5, end_time=end_time, dtype=precision)
+def _channel(factor: Callable, end_time: float, precision: str, ends: str = "fringe") -> Run:
+    scene = poiseuille_open(12, ends=ends, h_over_dx=1.5, end_time=end_time, dtype=precision)
     return Run(_varying(scene, factor), about(scene, 40))
 
 
 def _varying(scene: Scene, factor: Callable) -> Scene:
-    effects = tuple(
-        dataclasses.replace(effect, profile=Varying(effect.profile, factor))
-        if isinstance(effect, Fringe)
-        else effect
-        for effect in scene.effects
-    )
-    return dataclasses.replace(scene, effects=effects)
+    """The scene with an inflow of another strength, its last effect's."""
+    *others, last = scene.effects
+    if isinstance(last, Fringe):
+        last = dataclasses.replace(last, profile=Varying(last.profile, factor))
+    else:
+        inlet, *rest = last.openings
+        inlet = dataclasses.replace(inlet, velocity=Varying(inlet.velocity, factor))
+        last = dataclasses.replace(last, openings=(inlet, *rest))
+    return dataclasses.replace(scene, effects=(*others, last))
 
 
 def _cylinder(resolution: int, reynolds: float, end_time: float) -> Run:
@@ -49,15 +53,19 @@ def _cylinder(resolution: int, reynolds: float, end_time: float) -> Run:
     return Run(scene, about(scene, 40))
 
 
-def _vortex_leaves(end_time: float) -> Run:
+def _vortex_leaves(end_time: float, ends: str = "fringe") -> Run:
     """One of twice the inflow's speed, half a radius ahead of the outlet: part of it turns back."""
-    scene = poiseuille_open(16, 1000.0, h_over_dx=1.5, end_time=end_time, dtype="float64")
-    (fringe,) = (effect for effect in scene.effects if isinstance(effect, Fringe))
+    scene = poiseuille_open(
+        16, 1000.0, ends=ends, h_over_dx=1.5, end_time=end_time, dtype="float64"
+    )
     position = scene.state.position
     apart = (position - jnp.asarray([[LENGTH - 0.1, 0.5]])) / 0.2
     turn = jnp.exp(0.5 - 0.5 * jnp.sum(apart**2, axis=1))[:, None]
     around = jnp.stack([-apart[:, 1], apart[:, 0]], axis=1) * turn
-    velocity = fringe.profile(position, jnp.zeros(())) + 2.0 * around
+    inflow = ParabolicProfile(jnp.ones(()), 1.0)(position, jnp.zeros(()))
+    if scene.parking is not None:
+        inflow = jnp.where(scene.parking.holds(position)[:, None], 0.0, inflow)
+    velocity = inflow + 2.0 * around
     state = dataclasses.replace(scene.state, velocity=velocity)
     return Run(dataclasses.replace(scene, state=state), about(scene, 40))
 
@@ -102,6 +110,14 @@ def _in_a_stream(
     return Run(scene if factor is None else _varying(scene, factor), about(scene, 40))
 
 
+def _filling(end_time: float, parked: int, factor: Callable | None = None) -> Run:
+    """A tank 20 particles wide, with so many parked."""
+    scene = filling_tank(20, end_time=end_time, dtype="float64")
+    state = jax.tree.map(lambda a: a[: scene.flowing + parked], scene.state)
+    scene = dataclasses.replace(scene, state=state)
+    return Run(scene if factor is None else _varying(scene, factor), about(scene, 20))
+
+
 def _sinking(end_time: float) -> Run:
     scene = floating_box(density=4000.0, end_time=end_time, dtype="float64")
     return Run(scene, about(scene, 40))
@@ -115,6 +131,10 @@ def _stops(time):
     """From 1 to 0 between 0.5 s and 1 s."""
     way = jnp.clip(2.0 * time - 1.0, 0.0, 1.0)
     return 1.0 - way * way * (3.0 - 2.0 * way)
+
+
+def _drains(time):
+    return -jnp.ones_like(time)
 
 
 def _swings(time):
@@ -138,6 +158,19 @@ OPEN = (
          partial(_channel, _steady, 3.0, "float32"), PULSED, precision="float32"),
     Case("open/back-flow-float32", "single precision, the inflow swings",
          partial(_channel, _swings, 3.0, "float32"), PULSED, precision="float32"),
+    Case("open/buffers-inflow-stops", "through openings, the inflow stops within 0.5 s, 3 s",
+         partial(_channel, _stops, 3.0, "float64", "openings"), STOPPED),
+    Case("open/buffers-back-flow", "through openings, the inflow swings: half of the time out",
+         partial(_channel, _swings, 3.0, "float64", "openings"), THROUGH),
+    Case("open/buffers-float32", "the same in single precision",
+         partial(_channel, _swings, 3.0, "float32", "openings"), THROUGH, precision="float32"),
+    Case("open/none-parked", "a tank that fills, four particles parked and more coming in",
+         partial(_filling, 1.6, 4), endings=(Ending.FAULT,), says="park more of them",
+         codes=(FaultCode.NONE_PARKED,)),
+    Case("open/buffers-vortex-leaves", "16 across, Re = 1000, a vortex leaves through an opening",
+         partial(_vortex_leaves, 3.0, "openings"), LEAVING, slow=True),
+    Case("open/tank-drains", "the tank's inflow turned round: it drains to the port's top, 6 s",
+         partial(_filling, 6.0, 0, _drains), STRUCK, slow=True),
     Case("open/impulsive-start", "a cylinder, 6 particles a diameter, Re = 20, set going at once",
          partial(_cylinder, 25, 20.0, 0.5), STRUCK, slow=True),
     Case("open/vortex-leaves", "16 across, Re = 1000, twice the inflow's speed in it, 3 s",

@@ -159,13 +159,13 @@ class Openings(Effect):
         du_i/dt = (1 - s_i) a_i + s_i [dU/dt - rate (u_i - U(x_i, t))],
         drho_i/dt = (1 - q_i) r_i + q_i rate (R_i - rho_i)  or, where a pressure is given,
         drho_i/dt = (1 - q_i) r_i + q_i [(rho0 / c0) A_i + pressure_rate (R_i - rho_i)],
-        dx_i/dt = u_i + (1 - s_i) (1 - q_i) d_i,
+        dx_i/dt = u_i + (1 - s_i) d_i  where fluid comes in,
 
     a_i, r_i and d_i what all other effects give; U the velocity and R the density of the
-    opening's pressure where it has one, or the means of the fluid in its front; A the mean of a in
-    the front, outwards, by which a sound wave that goes out finds itself there and none comes back
-    (Poinsot and Lele 1992). The shares s and q rise from 0 to 1 along the front for what is
-    prescribed, behind it for what is not.
+    opening's pressure where it has one, or the means of the fluid in its front, of its velocity
+    through the mouth; A the mean of a in the front, outwards, by which a sound wave that goes out
+    finds itself there and none comes back (Poinsot and Lele 1992). The shares s and q rise from 0
+    to 1 along the front for what is prescribed, behind it for what is not.
 
     A particle that comes out of a reserve towards the flow is put in once more at the reserve's
     end, with the fields it has; one that goes out at the end is parked. Both are done where a
@@ -203,7 +203,8 @@ class Openings(Effect):
             out = -opening.inward * rates["velocity"][:, opening.axis]
             read = (velocity, density[:, None], out[:, None])
             known = opening.in_front(position, jnp.concatenate(read, axis=1))
-            wanted, change, own = known[:, :-2], jnp.zeros_like(velocity), left_open[:, None]
+            wanted = jnp.zeros_like(velocity).at[:, opening.axis].set(known[:, opening.axis])
+            change, own = jnp.zeros_like(velocity), left_open[:, None]
             if opening.velocity is not None:
                 own = prescribed[:, None]
                 wanted, change = jax.jvp(
@@ -217,7 +218,8 @@ class Openings(Effect):
                 back = fluid.density(opening.pressure) - density
                 fill, share = sound + opening.pressure_rate * back, prescribed
             pull = change - self.rate * (velocity - wanted)
-            drift = (1.0 - own) * (1.0 - share[:, None]) * drift
+            comes_in = opening.inward * wanted[:, opening.axis : opening.axis + 1] > 0.0
+            drift = jnp.where(comes_in, 1.0 - own, 1.0) * drift
             rates = rates | {
                 "velocity": rates["velocity"] + own * (pull - rates["velocity"]),
                 "density": rates["density"] + share * (fill - rates["density"]),

@@ -112,8 +112,8 @@ def filling_tank(
     highest = float(level(np.asarray(end_time), inflow))
     if highest > TOP - support:
         raise ValueError(
-            f"t-end: by {end_time:g} s the water stands {highest:.3g} m high in a tank of {TOP:g} m; "
-            "end before, or let less come in."
+            f"t-end: by {end_time:g} s the water stands {highest:.3g} m high in a tank of {TOP:g} "
+            "m; end before, or let less come in."
         )
     front, reserve = buffer_lengths(support, dx)
     behind = front + reserve
