@@ -81,8 +81,12 @@ class FullModel(Model):
     def begin(self, state):
         if self.search.devices is None and self.parking is None:
             return state, self._outdated(state)
-        neighbors = self.prepare(state)
-        if self.search.devices is None:
+        return self._listed(state, self._beside(state).search)
+
+    def _listed(self, state, search):
+        """A state as steps keep it, and its list made anew."""
+        neighbors = search.build(state.position)
+        if search.devices is None:
             return state, neighbors
         return _arranged(state, neighbors.sort), neighbors.in_place()
 
@@ -100,26 +104,23 @@ class FullModel(Model):
         search, motion = self._motion(state, time_step)
 
         def rebuilt(state, neighbors):
-            state = self._exchanged(state, neighbors)
+            if self.parking is not None:  # who is put in is by number, on however many devices
+                state = self.end(state, neighbors)
+                return self._listed(state, search)
             new = search.build(state.position)
-            if search.devices is None:
-                return state, new
             return _arranged(state, new.sort), new.in_place(neighbors.order)
 
         outdated = is_outdated(search, auxiliary, state.position, motion)
         return lax.cond(outdated, rebuilt, lambda *same: same, state, auxiliary)
 
-    def _exchanged(self, state, neighbors):
-        """A state with what came in and went out since its list was made."""
-        for effect in self.functional.effects:
-            state = effect.exchanged(state, neighbors.reference, self.functional.fluid)
-        return state
-
     def end(self, state, auxiliary):
-        state = self._exchanged(state, auxiliary)
-        if self.search.devices is None:
-            return state
-        return _arranged(state, auxiliary.by_number)
+        since = auxiliary.reference
+        if self.search.devices is not None:
+            state = _arranged(state, auxiliary.by_number)
+            since = auxiliary.by_number(since) if self.parking is not None else since
+        for effect in self.functional.effects:  # what came in and went out since
+            state = effect.exchanged(state, since, self.functional.fluid)
+        return state
 
     def rates(self, time, state, auxiliary):
         return self.functional(time, state, auxiliary)

@@ -26,6 +26,7 @@ from jaxsph.scenes import (
     dam_break,
     lid_driven_cavity,
     piston_wave_maker,
+    poiseuille_open,
     taylor_green,
     taylor_green_3d,
 )
@@ -42,6 +43,7 @@ SCENES = {
     "piston": lambda: piston_wave_maker(64),
     "even vortex": lambda: taylor_green(32, h_over_dx=1.3, arrangement=JitteredLattice()),
     "even cavity": lambda: lid_driven_cavity(32, h_over_dx=1.3),
+    "openings": lambda: poiseuille_open(12, ends="openings", h_over_dx=1.5, end_time=1.0),
     # too small for halos
     "small vortex": lambda: taylor_green(18, arrangement=JitteredLattice()),
     "small cavity": lambda: lid_driven_cavity(18),

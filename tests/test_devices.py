@@ -50,9 +50,11 @@ def lowered(model, state):
     return eqx.filter_jit(run).lower(model, state).as_text()
 
 
-def test_eight_devices_are_one():
-    """31 x 31 particles divide into no eight equal shares; their list is rebuilt on the way."""
-    difference = found("run", "vortex", 12)
+@pytest.mark.parametrize("scene, steps", [("vortex", 12), ("openings", 20)])
+def test_eight_devices_are_one(scene, steps):
+    """31 x 31 particles divide into no eight equal shares; their list is rebuilt on the way.
+    Who is put in through an opening is the same particle."""
+    difference = found("run", scene, steps)
     assert difference.pop("way_over_half_skin") > 1.0  # so a list was built in mid-run
     assert all(0.0 <= d < ROUND_OFF for d in difference.values()), difference
 

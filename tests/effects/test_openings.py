@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +14,9 @@ from jaxsph.effects import FreeSlip, Opening, Openings, UniformProfile
 from jaxsph.integrate import FaultCode
 from jaxsph.io import read_snapshot, read_trajectory, snapshot_blocks
 from jaxsph.parking import Parking
-from jaxsph.scenes import OpenEnds, Scale, flow_through, poiseuille_open
+from jaxsph.scenes import OpenEnds, Scale, composed, flow_through, poiseuille_open
+from jaxsph.scenes.ends import buffer_lengths, buffer_rate, put_at_openings
+from jaxsph.schemes import Consistent
 from jaxsph.walls import BoxRegion
 
 ACROSS = BoxRegion((-np.inf, 0.0), (np.inf, 1.0))
@@ -151,6 +154,54 @@ def test_the_front_is_read_by_places_across_the_mouth(dim):
     # where no particle is in the front, nothing is not a number
     nobody = opening.in_front(position.at[:, 0].add(-3.0), values)
     assert bool(jnp.all(jnp.isfinite(nobody)))
+
+
+class Along(eqx.Module):
+    """A uniform velocity along an axis."""
+
+    speed: jax.Array
+    axis: int = eqx.field(static=True)
+
+    def __call__(self, position, time):
+        return jnp.zeros_like(position).at[:, self.axis].set(self.speed)
+
+
+@pytest.mark.parametrize("dim, axis, speed", [(2, 1, -1.0), (3, 2, 1.0)])
+def test_a_stream_goes_through_along_any_axis_and_either_way(dim, axis, speed):
+    dx, (front, reserve) = 0.125, buffer_lengths(0.325, 0.125)
+    lower, upper, periodic = [0.0] * dim, [1.0] * dim, [True] * dim
+    lower[axis], upper[axis], periodic[axis] = -front - reserve, 1.0 + front + reserve, False
+    box = Box(tuple(lower), tuple(upper), tuple(periodic))
+    inflow = Along(jnp.asarray(speed), axis)
+    scene = composed(
+        "stream",
+        effects=Consistent().effects(0.01),
+        box=box,
+        scale=Scale(8, 1.3, 0.012, 5),
+        end_time=0.24,
+        reference_density=1.0,
+        reference_speed=1.0,
+        side=1.0,
+        velocity=lambda x: inflow(x, 0.0),
+        arrangement=Lattice(),
+    )
+    low, high = list(upper), list(lower)
+    low[axis], high[axis] = 0.0, 1.0
+    sides = [(box.lower, tuple(low)), (tuple(high), box.upper)]
+    sides = sides if speed > 0.0 else sides[::-1]
+    sizes = {"axis": axis, "reserve": reserve, "cell": dx}
+    way = float(np.sign(speed))
+    inlet = Opening(inflow, None, None, *sides[0], inward=way, **sizes)
+    outlet = Opening(None, jnp.zeros(()), jnp.ones(()), *sides[1], inward=-way, **sizes)
+    ends = Openings((inlet, outlet), buffer_rate(scene), Parking(box, axis))
+    everywhere = BoxRegion((-np.inf,) * dim, (np.inf,) * dim)
+    flow = run_scene(put_at_openings(scene, ends, everywhere, 64))
+    assert (flow.active.sum(axis=1) == scene.state.position.shape[0]).all()
+    there = flow.active[-1]
+    np.testing.assert_allclose(flow.velocity[-1][there][:, axis], speed, rtol=1e-12)
+    np.testing.assert_allclose(flow.density[-1][there], 1.0, rtol=1e-12)
+    jumped = np.abs(np.diff(flow.position[:, :, axis], axis=0)) > 0.5
+    assert jumped.any()  # from the outlet's end to the inlet's
 
 
 def exchange(position, since, parked=2, velocity=None):

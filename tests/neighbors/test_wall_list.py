@@ -269,3 +269,21 @@ def test_box_too_small_for_the_support_raises(dim):
     ghosts = jnp.asarray(ghosts_around(box))
     with pytest.raises(ValueError, match="box: a periodic length of .* too small"):
         WalledSearch.allocate(jnp.zeros((1, dim)), ghosts, box, SUPPORT, SKIN, SPACING)
+
+
+def test_fluid_may_come_to_where_ghosts_are_denser():
+    """More room in a list is room for them: no run of cells is known by the start alone."""
+    box = Box((0.0, 0.0), (1.0, 2.0), (False, False))
+    ticks = 0.05 * np.arange(-4, 0) + 0.025
+    along = 0.05 * np.arange(-4, 24) + 0.025
+    floor = np.stack(np.meshgrid(along, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    finer = 0.025 * np.arange(-8, 48) + 0.0125
+    lid = np.stack(np.meshgrid(finer, 2.0 + 0.025 * np.arange(8) + 0.0125), axis=-1).reshape(-1, 2)
+    ghosts = jnp.asarray(np.concatenate([floor, lid]))
+    places = 0.05 * np.arange(20) + 0.025
+    low = np.stack(np.meshgrid(places, places[:8], indexing="ij"), axis=-1).reshape(-1, 2)
+    search = WalledSearch.allocate(jnp.asarray(low), ghosts, box, 0.2, 0.04, 0.05)
+    high = jnp.asarray(low + np.array([[0.0, 1.6]]))
+    for _ in range(12):
+        search = search.enlarged()
+    assert not bool(search.build(high).overflow)
