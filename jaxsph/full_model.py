@@ -193,6 +193,8 @@ class FullModel(Model):
         limit = float(here.step_limit(state, jnp.zeros((), state.position.dtype)))
         of = here._beside(state).functional
         particle = int(fault.particle)
+        if self.parking is not None and bool(self.parking.holds(state.position)[particle]):
+            return None  # it has gone out meanwhile
         squeezed = squeezed_water(of.walls, of.space)
         if squeezed is not None:
             return squeezed

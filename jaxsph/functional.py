@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .compiled import full_precision
-from .effects import BodyForce, Context, Effect
+from .effects import BodyForce, Context, Effect, parking_of
 from .fluid import Fluid
 from .free_motion import body_rates
 from .neighbors import VerletList, WallList
@@ -125,9 +125,8 @@ class SPHFunctional(eqx.Module):
         """What its effects may know at a time [s], with walls and pairs of the fluid if given."""
         bodies = None if walls is None else walls.bodies
         forces = tuple(e for e in self.effects if isinstance(e, BodyForce))
-        parks = (effect.parks_at() for effect in self.effects)
-        parking = next((place for place in parks if place is not None), None)
-        return Context(time, self.fluid, self.mass, self.space, bodies, forces, parking, pairs)
+        given = (time, self.fluid, self.mass, self.space, bodies, forces)
+        return Context(*given, parking_of(self.effects), pairs)
 
     def walls_then(self, context: Context) -> Walls:
         """The walls where they are in a context of this functional."""

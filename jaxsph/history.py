@@ -62,12 +62,13 @@ def read_history(
     parts = []
     for block in snapshot_blocks(path, size, every):
         velocity = block.velocity.astype(np.float64)
+        active = True if block.active is None else block.active
         parts.append(
             (
                 block.time,
                 kinetic_energy(velocity, mass),
-                block.density.min(axis=1),
-                block.density.max(axis=1),
+                np.where(active, block.density, np.inf).min(axis=1),
+                np.where(active, block.density, -np.inf).max(axis=1),
                 np.sqrt((velocity**2).sum(axis=2).max(axis=1)),
             )
         )

@@ -210,14 +210,15 @@ class Trajectory(eqx.Module):
         if not concrete(self.time, self.velocity, self.density):
             return None
         name = self.metadata.get("scene")
-        speed = np.linalg.norm(self.velocity, axis=-1)
+        there = ... if self.active is None else np.asarray(self.active)
+        speed = np.linalg.norm(self.velocity, axis=-1)[there]
         return {
             **({} if name is None else {"scene": str(name)}),
             "snapshots": f"{len(self.time)}, at {spread(self.time, 's')}",
             "particles": f"{self.particles} in {self.position.shape[-1]}D",
             "speed": spread(speed, "m/s"),
-            "density": spread(self.density, "kg/m^3"),
-            "pressure": spread(self.pressure, "Pa"),
+            "density": spread(np.asarray(self.density)[there], "kg/m^3"),
+            "pressure": spread(np.asarray(self.pressure)[there], "Pa"),
             **({"forces on": ", ".join(self.forces)} if self.forces else {}),
             **({} if self.coordinates is None else {"modes": str(self.coordinates.shape[-1])}),
         }

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxsph import BallRegion, WallPart
 from jaxsph.effects import Fringe, ParabolicProfile, Varying
 from jaxsph.integrate import FaultCode
+from jaxsph.parking import flowing
 from jaxsph.scenes import (
     FringeEnds,
     Scale,
@@ -113,7 +114,8 @@ def _in_a_stream(
 def _filling(end_time: float, parked: int, factor: Callable | None = None) -> Run:
     """A tank 20 particles wide, with so many parked."""
     scene = filling_tank(20, end_time=end_time, dtype="float64")
-    state = jax.tree.map(lambda a: a[: scene.flowing + parked], scene.state)
+    moving = len(flowing(scene.state.position, scene.parking))
+    state = jax.tree.map(lambda a: a[: moving + parked], scene.state)
     scene = dataclasses.replace(scene, state=state)
     return Run(scene if factor is None else _varying(scene, factor), about(scene, 20))
 

@@ -134,8 +134,9 @@ def _errors(scene: Scene, trajectory: Trajectory) -> dict[str, float] | None:
     """Relative errors at the end, over the particles, where the scene has an exact flow."""
     if scene.exact is None:
         return None
-    exact, _ = scene.exact(trajectory.position[-1], float(trajectory.time[-1]))
-    exact, velocity = (np.asarray(u, np.float64) for u in (exact, trajectory.velocity[-1]))
+    last = trajectory.snapshot(-1).in_flow()
+    exact, _ = scene.exact(last.position, float(trajectory.time[-1]))
+    exact, velocity = (np.asarray(u, np.float64) for u in (exact, last.velocity))
     energy, found = (float(kinetic_energy(u, float(scene.mass))) for u in (exact, velocity))
     if energy == 0.0:  # an exact flow at rest: nothing to be relative to
         return None

@@ -87,6 +87,7 @@ def measures_of(path: Path, overview: Overview) -> dict[str, Any]:
     mass = overview.mass or float("nan")
     history = read_history(path, overview.particles, mass, every)
     _, last = read_snapshot(path, overview.snapshots - 1)
+    last = last.in_flow()
     measures = {
         "lowest_density": min(float(history.lowest_density.min()), float(last.density.min())),
         "highest_density": max(float(history.highest_density.max()), float(last.density.max())),

@@ -6,6 +6,7 @@ from .artificial_viscosity import ArtificialViscosity as ArtificialViscosity
 from .background_pressure import BackgroundPressure as BackgroundPressure
 from .base import Context as Context
 from .base import Effect as Effect
+from .base import parking_of as parking_of
 from .body_force import BodyForce as BodyForce
 from .body_force import CentralForce as CentralForce
 from .body_force import Gravity as Gravity

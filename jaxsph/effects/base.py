@@ -52,6 +52,18 @@ def viscous_step_limit(viscosity, space: Space):
     return jnp.where(moving, limit, jnp.inf)
 
 
+def parking_of(effects: tuple[Effect, ...]) -> Parking | None:
+    """Where particles wait that are in no flow, if an effect lets some come in and go out.
+
+    Raises:
+        ValueError: if several effects do.
+    """
+    places = [place for place in (effect.parks_at() for effect in effects) if place is not None]
+    if len(places) > 1:
+        raise ValueError("effects: list all openings in one Openings; there are several of them.")
+    return places[0] if places else None
+
+
 class Effect(eqx.Module):
     """A part of the SPH functional, in two passes over the pairs.
 

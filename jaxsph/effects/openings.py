@@ -17,6 +17,11 @@ _LEAST = 1e-3  # particles in a cell that has a mean of its own
 _STABLE = 2.0  # over the rate; RK4 stands 2.78
 
 
+def _array(value):
+    """A number as an array, which may be swept; None as it is."""
+    return None if value is None else jnp.asarray(value)
+
+
 class Opening(eqx.Module):
     """A part of the flow's border, and the buffer of particles behind it.
 
@@ -40,22 +45,29 @@ class Opening(eqx.Module):
         reserve: length of the reserve [m], a whole number of particles; at least the kernel's
             support and a half, so that those that come out of it miss none (static).
         cell: width of the means over places across the mouth [m] (static).
+        periodic: axes across the mouth along which it goes all round a periodic box (static).
 
     Raises:
-        ValueError: if the corners span no cuboid or `inward` is no direction.
+        ValueError: if the corners span no cuboid, an axis, a length or `inward` is none, or a
+            pressure comes without its rate.
     """
 
     velocity: eqx.Module | None
-    pressure: Float[Array, ""] | None
-    pressure_rate: Float[Array, ""] | None
+    pressure: Float[Array, ""] | None = eqx.field(converter=_array)
+    pressure_rate: Float[Array, ""] | None = eqx.field(converter=_array)
     lower: tuple[float, ...] = eqx.field(static=True)
     upper: tuple[float, ...] = eqx.field(static=True)
     axis: int = eqx.field(static=True)
     inward: float = eqx.field(static=True)
     reserve: float = eqx.field(static=True)
     cell: float = eqx.field(static=True)
+    periodic: tuple[int, ...] = eqx.field(static=True, default=())
 
     def __check_init__(self):
+        if not 0 <= self.axis < len(self.lower):
+            raise ValueError(f"opening: axis {self.axis} in {len(self.lower)} dimensions.")
+        if not self.cell > 0.0:
+            raise ValueError(f"opening: cells must be wider than zero, got {self.cell:g} m.")
         if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
             raise ValueError(f"opening: {self.upper} m must lie beyond {self.lower} m.")
         if not 0.0 < self.reserve < self.length:
@@ -119,38 +131,48 @@ class Opening(eqx.Module):
     ) -> Float[Array, "particles fields"]:
         """Values of the fluid in the front, at the places across the mouth of all particles.
 
-        Means over cells across the mouth, linear between them; the mean of all where one is empty.
+        Means over cells across the mouth, linear between them; the mean of all where one is empty,
+        a particle's own values where no particle is in the front.
         """
         depth = self.depth(position)
         inside = self.spans(position) & (depth >= 0.0) & (depth <= _FRONT * self.before_reserve)
         weighed = jnp.concatenate([values, jnp.ones_like(values[:, :1])], axis=1)
         weighed = jnp.where(inside[:, None], weighed, 0.0)
-        first, *others = (self._hats(position[:, k], k) for k in self._across)
-        spread = weighed
-        for hats in others:
-            spread = (hats[:, :, None] * spread[:, None, :]).reshape(position.shape[0], -1)
-        total = (first.T @ spread).reshape(-1, weighed.shape[1])
+        corners, cells = self._corners(position)
+        total = jnp.zeros((cells, weighed.shape[1]), weighed.dtype)
+        for cell, share in corners:
+            total = total.at[cell].add(share[:, None] * weighed)
         mean = jnp.sum(total, axis=0)
         mean = mean / jnp.maximum(mean[-1:], _LEAST)
         known = total[:, -1:] > _LEAST
         table = jnp.where(known, total / jnp.where(known, total[:, -1:], 1.0), mean[None])
-        found = first @ table.reshape(first.shape[1], -1)
-        for hats in reversed(others):
-            found = found.reshape(position.shape[0], hats.shape[1], -1)
-            found = jnp.sum(hats[:, :, None] * found, axis=1)
-        return found[:, :-1]
+        found = sum(share[:, None] * table[cell, :-1] for cell, share in corners)
+        return jnp.where(jnp.any(known), found, values)
 
     @property
     def _across(self) -> tuple[int, ...]:
         return tuple(k for k in range(len(self.lower)) if k != self.axis)
 
-    def _hats(self, x: Float[Array, " particles"], k: int) -> Float[Array, "particles cells"]:
-        """How much of each cell along an axis a place is, linear between their middles."""
-        length = self.upper[k] - self.lower[k]
-        count = max(1, round(length / self.cell))
-        along = jnp.clip((x - self.lower[k]) * (count / length) - 0.5, 0.0, count - 1.0)
-        apart = jnp.abs(along[:, None] - jnp.arange(count, dtype=x.dtype)[None])
-        return jnp.maximum(1.0 - apart, 0.0)
+    def _corners(self, position: Float[Array, "particles dim"]):
+        """The cells about each place across the mouth and its shares in them, linear between their
+        middles; and how many cells there are."""
+        corners = [(jnp.zeros(position.shape[0], jnp.int32), jnp.ones_like(position[:, 0]))]
+        cells = 1
+        for k in self._across:
+            length = self.upper[k] - self.lower[k]
+            count = max(1, round(length / self.cell))
+            along = (position[:, k] - self.lower[k]) * (count / length) - 0.5
+            if k not in self.periodic:
+                along = jnp.clip(along, 0.0, count - 1.0)
+            first = jnp.floor(along)
+            second_share = along - first
+            first = first.astype(jnp.int32)
+            sides = ((first % count, 1.0 - second_share), ((first + 1) % count, second_share))
+            corners = [
+                (cell * count + own, share * part) for cell, share in corners for own, part in sides
+            ]
+            cells *= count
+        return corners, cells
 
 
 class Openings(Effect):
@@ -192,8 +214,10 @@ class Openings(Effect):
         return self.parking
 
     def step_limit(self, fluid, space):
-        acting = self.rate > 0.0
-        return jnp.where(acting, _STABLE / jnp.where(acting, self.rate, 1.0), jnp.inf)
+        rates = [o.pressure_rate for o in self.openings if o.pressure_rate is not None]
+        rate = jnp.max(jnp.stack([self.rate, *rates]))
+        acting = rate > 0.0
+        return jnp.where(acting, _STABLE / jnp.where(acting, rate, 1.0), jnp.inf)
 
     def governed(self, context, fields, rates):
         position, velocity, density = (fields[name] for name in ("position", "velocity", "density"))

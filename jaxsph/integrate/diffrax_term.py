@@ -17,6 +17,7 @@ def ode_term(model: Model, auxiliary: Any) -> diffrax.ODETerm:
     integrate that far at most, ask `model.inspect(step, state, auxiliary)` at the end, and go on
     from `model.finish(state)` with a term made anew. Solvers try stages beyond their steps, and
     steps that they reject; a particle may outrun the list there unseen, so leave some of the skin.
+    Where particles come in and go out through openings, go on from `model.end(state, auxiliary)`.
 
     Args:
         model: full or reduced.

@@ -41,6 +41,7 @@ def save_trajectory(
         parameters=metadata.get("parameters", {}),
         effects=(),
         mass=None,
+        parking=trajectory.active is not None or None,
         state=trajectory.state(0),
         schedule=Schedule(time_step, each, int(steps[-1]) // each),
     )

@@ -25,6 +25,7 @@ def depth_figure(time: float, snapshot: Snapshot, field: ParticleField = VELOCIT
     Raises:
         ValueError: if the particles are in a plane.
     """
+    snapshot = snapshot.in_flow()
     position, value = np.asarray(snapshot.position), np.asarray(field.value(snapshot))
     if position.shape[1] != 3:
         raise ValueError(

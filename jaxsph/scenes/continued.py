@@ -26,9 +26,14 @@ def continued(scene: Scene, state: ParticleState, space: Space) -> Scene:
         space: of the other run, which says how far its particles reach.
 
     Raises:
-        ValueError: if the runs are in different boxes, or the other run's particles have clumped
-            or leave a place without any.
+        ValueError: if particles come in and go out, the runs are in different boxes, or the other
+            run's particles have clumped or leave a place without any.
     """
+    if scene.parking is not None:
+        raise ValueError(
+            "scene: particles come in and go out of it, and those of the other run are not its "
+            "own; let it run from its start."
+        )
     if space.box != scene.space.box:
         raise ValueError("box: the two runs are in different boxes; name a run of the same scene.")
     carry = MovingLeastSquaresMap.allocate(scene.state.position, space)

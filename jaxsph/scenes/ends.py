@@ -97,9 +97,10 @@ class FringeEnds(Ends):
         return x > length
 
     def close(self, scene, length, inflow, region):
-        box, dx = scene.space.box, scene.space.spacing
+        box = scene.space.box
         held = Fringe(inflow, buffer_rate(scene), length, box.upper[0])
-        _check_even(region, held, (box.lower[1], box.upper[1]), dx)
+        halfway = 0.5 * (held.start + held.end)
+        _check_even(region, halfway, held.end, scene, f"the fringe, {held.start:g} m")
         return dataclasses.replace(scene, effects=(*scene.effects, held))
 
 
@@ -138,8 +139,11 @@ class OpenEnds(Ends):
     def close(self, scene, length, inflow, region):
         space, box, state = scene.space, scene.space.box, scene.state
         mouth = box.upper[0] + box.lower[0]
+        _check_even(region, box.lower[0], 0.0, scene, f"the inlet's buffer, {box.lower[0]:g} m")
+        _check_even(region, mouth, box.upper[0], scene, f"the outlet's buffer, {mouth:g} m")
         _, reserve = buffer_lengths(space.support, space.spacing)
         sizes = {"axis": 0, "reserve": reserve, "cell": space.spacing}
+        sizes["periodic"] = (1,) if box.periodic[1] else ()
         inlet = Opening(inflow, None, None, box.lower, (0.0, box.upper[1]), inward=1.0, **sizes)
         corners = (mouth, box.lower[1]), box.upper
         returning = _RETURN * scene.fluid.sound_speed / length
@@ -167,20 +171,18 @@ def put_at_openings(scene: Scene, ends: Openings, region: Region, spare: float) 
     return dataclasses.replace(scene, effects=(*scene.effects, ends), state=state)
 
 
-def _check_even(
-    region: Region, fringe: Fringe, across: tuple[float, float], spacing: float
-) -> None:
-    """A ValueError if walls change along the second half of a fringe."""
-    columns = max(1, int(0.5 * (fringe.end - fringe.start) / spacing))
-    x = fringe.end - spacing * (0.5 + np.arange(columns)[::-1])
-    y = np.arange(across[0] + 0.5 * spacing, across[1], spacing)
+def _check_even(region: Region, start: float, end: float, scene: Scene, where: str) -> None:
+    """A ValueError if walls change between two places along the flow [m]."""
+    box, spacing = scene.space.box, scene.space.spacing
+    columns = max(1, int((end - start) / spacing + 1e-9))
+    x = end - spacing * (0.5 + np.arange(columns)[::-1])
+    y = np.arange(box.lower[1] + 0.5 * spacing, box.upper[1], spacing)
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
     distance = np.asarray(region.signed_distance(jnp.asarray(places.reshape(-1, 2))))
     fluid = (distance < 0.0).reshape(places.shape[:2])
     changes = np.flatnonzero((fluid != fluid[-1]).any(axis=1))
     if len(changes):
         raise ValueError(
-            f"region: its walls change along the fringe, at x = {x[changes[0]]:.4g} m, where the "
-            f"velocity of the inflow is held; let bodies end before {fringe.start:g} m, and walls "
-            f"go on straight to {fringe.end:g} m."
+            f"region: its walls change at x = {x[changes[0]]:.4g} m, along {where} to {end:g} m, "
+            "where velocities are held; let bodies lie in the flow, and walls go on straight."
         )

@@ -35,6 +35,7 @@ REFERENCE_DENSITY, GRAVITY = 1000.0, 9.81  # kg/m^3, m/s^2
 LENGTH, TOP, DEPTH, PORT = 1.0, 1.0, 0.4, 0.2  # m
 SPEED = math.sqrt(GRAVITY * TOP)  # m/s, what the Mach number is of
 OPENS = 0.5  # s, within which the inflow comes to its full strength
+_WHOLE = 5  # particles along the tank: one across a fifth of it
 _MORE = 1.02  # times the particles that come in, parked at the start
 SCALES = {
     "small": Scale(resolution=40, h_over_dx=2.0, time_step=1e-3, steps_per_snapshot=100),
@@ -82,11 +83,13 @@ def filling_tank(
 
     Water 0.4 m deep is at rest at the start; the inflow, a parabola, comes to its full strength
     within 0.5 s. rho0 = 1000 kg/m^3, g = 9.81 m/s^2, Re = U b / nu with the port's height b; walls
-    have no friction. All particles that will come in are parked at the start (`Openings`).
-    `jaxsph.scenes.filling_tank.level` is how high the water must stand.
+    have no friction. All particles that will come in are parked at the start (`Openings`). A gauge
+    (`jaxsph.metrics.surface_height`) should stand some spacings off the left wall, as it mirrors at
+    the box's end, not there. `jaxsph.scenes.filling_tank.level` is how high the water must stand.
 
     Args:
-        resolution: particles along the tank; overrides the scale's, time step scaled along.
+        resolution: particles along the tank, a multiple of 5; overrides the scale's, time step
+            scaled along.
         reynolds: Reynolds number.
         inflow: mean speed in the port [m/s].
         scale: `small` (40), `half` (80) or `paper` (160 particles along it).
@@ -107,6 +110,11 @@ def filling_tank(
     kernel = WendlandC2() if kernel is None else kernel
     positive(reynolds=reynolds, inflow=inflow, **{"t-end": end_time})
     chosen = pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step)
+    if chosen.resolution % _WHOLE:
+        raise ValueError(
+            f"resolution: a multiple of {_WHOLE}, so that the port and the water are whole rows of "
+            f"particles, got {chosen.resolution}."
+        )
     dx = LENGTH / chosen.resolution
     support = kernel.support * chosen.h_over_dx * dx
     highest = float(level(np.asarray(end_time), inflow))

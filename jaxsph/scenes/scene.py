@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from ..effects import Effect
+from ..effects import Effect, parking_of
 from ..fluid import Fluid
 from ..full_model import CFL, FullModel
 from ..functional import SPHFunctional
@@ -79,20 +79,22 @@ class Scene(eqx.Module):
             self.solution = Solution.of(self, self.solution)
 
     def __check_init__(self):
+        inside = flowing(self.state.position, self.parking)
         if self.walls is not None:
-            inside = flowing(self.state.position, self.parking)
-            beyond = np.asarray(self.walls.beyond(inside))
+            beyond = np.asarray(self.walls.beyond(self.state.position))
+            if self.parking is not None:
+                beyond = beyond & ~np.asarray(self.parking.holds(self.state.position))
             if beyond.any():
                 first = int(np.argmax(beyond))
                 raise ValueError(
-                    f"particles: number {first} at {np.asarray(inside[first])} m and "
+                    f"particles: number {first} at {np.asarray(self.state.position[first])} m and "
                     f"{int(beyond.sum()) - 1} more start inside a wall; leave them out or move "
                     "the wall."
                 )
             refuse_rows_at_walls(self.walls, inside, self.space)
         check_one_fluid(self.state.density, float(self.fluid.reference_density))
         check_resolved(self.state.position, self.space)
-        check_filled(self.flowing, self.space, self._room)
+        check_filled(len(inside), self.space, self._room)
         limit = self.stable_time_step
         if not 0.0 < self.time_step <= limit * (1.0 + 1e-12):
             raise ValueError(
@@ -155,25 +157,22 @@ class Scene(eqx.Module):
     @property
     def mass(self):
         """Mass of a particle [kg]: rho0 V / N where the fluid fills a volume V, its vessel or its
-        periodic box, and rho0 times a cell of the lattice where it has a free surface."""
+        periodic box, and rho0 times a cell of the lattice where it has a free surface or
+        openings."""
         return self.fluid.reference_density * self.particle_volume
 
     @property
     def particle_volume(self) -> float:
         """Volume of a particle at rest [m^n]."""
         room = self._room
-        return self.space.cell_volume if room is None else room / self.flowing
-
-    @property
-    def flowing(self) -> int:
-        """Number of particles that are in the flow at the start, and not parked."""
-        return len(flowing(self.state.position, self.parking))
+        if room is None or self.parking is not None:  # how many are in the flow changes
+            return self.space.cell_volume
+        return room / len(self.state.position)
 
     @property
     def parking(self) -> Parking | None:
         """Where particles wait that are in no flow; None where none come in or go out."""
-        places = (effect.parks_at() for effect in self.effects)
-        return next((place for place in places if place is not None), None)
+        return parking_of(self.effects)
 
     @property
     def _room(self) -> float | None:
@@ -188,9 +187,12 @@ class Scene(eqx.Module):
         if not concrete(self.state.position):
             return None
         walls = "none" if self.walls is None else f"{len(self.walls.position)} ghosts"
+        count = len(self.state.position)
+        parked = count - len(flowing(self.state.position, self.parking))
         return {
             "name": self.name,
-            "particles": f"{len(self.state.position)} in {self.space.box.dim}D",
+            "particles": f"{count} in {self.space.box.dim}D"
+            + (f", {parked} of them parked" if parked else ""),
             "spacing": f"{self.space.spacing:.4g} m",
             "h/dx": f"{self.space.smoothing_length / self.space.spacing:.4g}",
             "walls": walls,

@@ -27,6 +27,7 @@ FORMAT = "jaxsph sweep"
 SCHEMA_VERSION = 1
 NOT_RUN = -1
 _UNITS = {"position": "m", "velocity": "m/s", "density": "kg/m^3", "pressure": "Pa"}
+_ACTIVE = "active"  # which particles are in the flow, where some come in or go out
 
 
 class SweepFileError(ValueError):
@@ -76,13 +77,16 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
             file.attrs["time_step"] = first.time_step
             file["time"] = times
             file["time"].attrs["unit"] = "s"
+            if first.parking is not None:
+                shapes[_ACTIVE] = state.density.shape
             for name, shape in shapes.items():
                 early = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
                 early.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
                 early.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
                 whole = (len(scenes), len(times), *shape)
-                data = file.create_dataset(name, whole, np.dtype(state.density.dtype), dcpl=early)
-                data.attrs["unit"] = _UNITS[name]
+                kind = np.dtype(bool if name == _ACTIVE else state.density.dtype)
+                data = file.create_dataset(name, whole, kind, dcpl=early)
+                data.attrs["unit"] = _UNITS.get(name, "1")
             for name in ("code", "step", "particle", "snapshots"):
                 file[name] = np.full(len(scenes), NOT_RUN if name != "snapshots" else 0, np.int32)
     except TrajectoryFileError as error:
@@ -96,6 +100,8 @@ def store(path: str | os.PathLike, number: int, snapshots: Snapshot, status: Seq
         SweepFileError: if they cannot be written; the member then counts as not run.
     """
     rows = {name: getattr(snapshots, name) for name in _UNITS}
+    if snapshots.active is not None:
+        rows[_ACTIVE] = snapshots.active
     code, *rest = status
     rows |= zip(("step", "particle", "snapshots", "code"), (*rest, code), strict=True)
     with _opened(Path(path)) as file:
@@ -139,7 +145,7 @@ def read_member(path: str | os.PathLike, number: int) -> Trajectory:
         record = json.loads(file.attrs["identity"])
         return Trajectory(
             time=file["time"][:good],
-            **{name: file[name][number, :good] for name in _UNITS},
+            **{name: file[name][number, :good] for name in (*_UNITS, _ACTIVE) if name in file},
             metadata={
                 "scene": record["scene"],
                 "parameters": record["parameters"][number],

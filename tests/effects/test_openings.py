@@ -10,14 +10,18 @@ import pytest
 
 from jaxsph import Box, Fluid, ParticleState, SimulationError, run_scene
 from jaxsph.arrangements import Lattice
+from jaxsph.cli.recorded import _errors
 from jaxsph.effects import FreeSlip, Opening, Openings, UniformProfile
+from jaxsph.history import read_history
 from jaxsph.integrate import FaultCode
 from jaxsph.io import read_snapshot, read_trajectory, snapshot_blocks
-from jaxsph.parking import Parking
-from jaxsph.scenes import OpenEnds, Scale, composed, flow_through, poiseuille_open
+from jaxsph.parking import Parking, flowing
+from jaxsph.scenes import OpenEnds, Scale, composed, continued, flow_through, poiseuille_open
 from jaxsph.scenes.ends import buffer_lengths, buffer_rate, put_at_openings
 from jaxsph.schemes import Consistent
+from jaxsph.sweeps import read_member, sweep
 from jaxsph.walls import BoxRegion
+from jaxsph_rom.still_walls import check_still
 
 ACROSS = BoxRegion((-np.inf, 0.0), (np.inf, 1.0))
 
@@ -48,6 +52,10 @@ def stream(ends=None, steps=40, dtype=None, speed=1.0, inflow=None):
 def plug():
     scene = stream()
     return scene, run_scene(scene)
+
+
+def in_flow(scene):
+    return len(flowing(scene.state.position, scene.parking))
 
 
 def openings_of(scene):
@@ -93,7 +101,7 @@ def test_nobody_is_a_neighbour_of_what_is_parked():
     position = scene.state.position
     search = scene.search()
     fewer = dataclasses.replace(
-        scene, state=jax.tree.map(lambda a: a[: scene.flowing], scene.state)
+        scene, state=jax.tree.map(lambda a: a[: in_flow(scene)], scene.state)
     ).search()
     assert (search.fluid.capacity, search.capacity) == (fewer.fluid.capacity, fewer.capacity)
     built = search.build(position)
@@ -151,9 +159,8 @@ def test_the_front_is_read_by_places_across_the_mouth(dim):
     assert inner.any()
     np.testing.assert_allclose(found[inner, 0], linear[inner], atol=1e-12)
     np.testing.assert_allclose(found[:, 1], 7.0, atol=1e-12)
-    # where no particle is in the front, nothing is not a number
-    nobody = opening.in_front(position.at[:, 0].add(-3.0), values)
-    assert bool(jnp.all(jnp.isfinite(nobody)))
+    # where no particle is in the front each has its own
+    np.testing.assert_array_equal(opening.in_front(position.at[:, 0].add(-3.0), values), values)
 
 
 class Along(eqx.Module):
@@ -317,6 +324,8 @@ def test_derivatives_are_those_of_the_flow():
     "make, message",
     [
         (lambda: an_opening(inward=0.5), "inward is 1.0 or -1.0, got 0.5"),
+        (lambda: an_opening(cell=0.0), "cells must be wider than zero"),
+        (lambda: dataclasses.replace(an_opening(), axis=2), "axis 2 in 2 dimensions"),
         (lambda: an_opening(reserve=1.0), "a reserve of 1 m in a buffer of 1 m"),
         (lambda: an_opening(pressure=jnp.zeros(())), "a pressure and its rate belong together"),
         (lambda: OpenEnds(spare=-0.1), "spare: a share of at least 0, got -0.1"),
@@ -331,5 +340,38 @@ def test_bad_openings_are_refused(make, message):
 
 def test_scenes_without_openings_know_nothing_of_them():
     scene = poiseuille_open(12, end_time=0.1)
-    assert scene.parking is None and scene.flowing == len(scene.state.position)
+    assert scene.parking is None
     assert scene.model().observe(scene.state).active is None
+
+
+def test_what_is_parked_is_in_no_figure(tmp_path):
+    """Errors beside the exact flow, mass of a restart, files of all kinds, pictures."""
+    scene = poiseuille_open(8, ends="openings", h_over_dx=1.5, end_time=0.1)
+    assert float(scene.mass) == pytest.approx(scene.space.cell_volume, rel=1e-12)  # rho0 = 1
+    flow = run_scene(scene)
+    later = dataclasses.replace(scene, state=flow.state(-1))
+    assert float(later.mass) == float(scene.mass)
+    there = flow.active[-1]
+    exact, _ = scene.exact(flow.position[-1], 0.0)
+    known = dataclasses.replace(flow, velocity=np.where(there[:, None], exact, 0.0)[None])
+    known = dataclasses.replace(known, time=flow.time[-1:], position=flow.position[-1:])
+    known = dataclasses.replace(known, active=flow.active[-1:])
+    known = dataclasses.replace(known, density=flow.density[-1:], pressure=flow.pressure[-1:])
+    assert _errors(scene, known)["velocity_relative_l2"] == 0.0
+    saved = read_trajectory(flow.save(tmp_path / "saved.h5"))
+    np.testing.assert_array_equal(saved.active, flow.active)
+    history = read_history(tmp_path / "saved.h5", flow.particles, float(scene.mass))
+    np.testing.assert_array_equal(
+        history.highest_density, np.where(flow.active, flow.density, 0.0).max(axis=1)
+    )
+    figure = flow.plot()
+    assert figure.axes[0].get_xlim()[0] > scene.space.box.lower[0] - 0.2
+    swept = tmp_path / "sweep.h5"
+    sweep([scene, scene], swept)
+    np.testing.assert_array_equal(read_member(swept, 1).active, flow.active)
+    with pytest.raises(ValueError, match="scene: particles come in and go out of it"):
+        continued(scene, flow.state(-1), scene.space)
+    with pytest.raises(ValueError, match="scene: particles come in and go out of"):
+        check_still(scene)
+    with pytest.raises(ValueError, match="list all openings in one Openings"):
+        dataclasses.replace(scene, effects=(*scene.effects, scene.effects[-1]))

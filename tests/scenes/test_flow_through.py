@@ -6,17 +6,17 @@ import pytest
 
 from jaxsph import BallRegion, BoxRegion
 from jaxsph.effects import UniformProfile
-from jaxsph.scenes import FringeEnds, Scale, flow_through
+from jaxsph.scenes import FringeEnds, OpenEnds, Scale, flow_through
 
 BODY = BallRegion((2.0, 0.0), 0.5)
 CHANNEL = BoxRegion((-np.inf, -1.5), (np.inf, 1.5))
 
 
-def stream(region=~BODY, inflow=None, length=4.0, fringe=2.0, periodic=True):
+def stream(region=~BODY, inflow=None, length=4.0, fringe=2.0, periodic=True, ends=None):
     return flow_through(
         "stream",
         length=length,
-        ends=FringeEnds(fringe),
+        ends=FringeEnds(fringe) if ends is None else ends,
         across=(-2.0, 2.0),
         periodic=periodic,
         region=region,
@@ -42,9 +42,12 @@ def test_a_body_before_the_fringe_and_straight_walls_are_taken():
 @pytest.mark.parametrize(
     "settings, message",
     [
-        ({"region": ~BallRegion((5.0, 0.0), 0.5)}, "region: its walls change along the fringe"),
+        ({"region": ~BallRegion((5.0, 0.0), 0.5)},
+         "region: its walls change at x = 5.* along the fringe, 4 m to 6 m"),
         ({"region": CHANNEL & ~BODY | BoxRegion((4.5, -2.0), (5.5, 0.0)), "periodic": False},
-         r"at x = 5\.\d+ m, where"),
+         r"at x = 5\.\d+ m, along the fringe"),
+        ({"region": ~BallRegion((4.5, 0.0), 0.5), "ends": OpenEnds()},
+         "region: its walls change at x = 4.* along the outlet's buffer, 4 m to"),
         ({"inflow": lambda x, t: x[:, 0]}, r"inflow: gives an array of shape \(\d+,\)"),
         ({"inflow": UniformProfile(20.0)}, "inflow: is as fast as 20 m/s at the start"),
         ({"inflow": UniformProfile(jnp.nan)}, "inflow: is as fast as nan m/s"),
