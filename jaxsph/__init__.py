@@ -36,6 +36,7 @@ from .neighbors import WallList as WallList
 from .pairs import PairTerm as PairTerm
 from .pairs import Space as Space
 from .pairs import pair_sum as pair_sum
+from .parking import Parking as Parking
 from .particles import ParticleState as ParticleState
 from .run_scene import run_scene as run_scene
 from .schedule import Schedule as Schedule

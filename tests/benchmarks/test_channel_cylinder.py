@@ -18,6 +18,7 @@ def test_pressure_and_flux_of_a_known_flow():
         position=position[None],
         velocity=np.full((1, *position.shape), [1.02 * MEAN, 0.0]),
         pressure=(3.0 - 2.0 * position[:, 0])[None],
+        active=None,
     )
     late = np.array([True])
     # linear fields are exact
