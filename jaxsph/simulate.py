@@ -233,10 +233,12 @@ def first_doubt(watch: Watch, trajectory: Trajectory) -> dict[str, Any]:
 
 
 def _lost(snapshot: Snapshot) -> int | None:
-    """The first particle with a field that is not finite; -1 if only coordinates are not."""
+    """The first particle with a field that is not finite; -1 if only coordinates or forces are
+    not."""
     fields = (snapshot.position, snapshot.velocity, snapshot.density, snapshot.pressure)
     bad = np.any([~np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in fields], axis=0)
     if bad.any():
         return int(np.argmax(bad))
-    coordinates = snapshot.coordinates
-    return None if coordinates is None or np.isfinite(coordinates).all() else -1
+    loads = (getattr(snapshot, name) for name in (*_LOADS, *_MEANS))
+    others = jax.tree.leaves((snapshot.coordinates, *loads))
+    return None if all(np.isfinite(each).all() for each in others) else -1

@@ -18,6 +18,7 @@ from ..points.dynamics.energy_bound import EnergyBound
 from ..points.dynamics.sampling import Sampling
 from ..points.parameters.family import Family, refuse_unlike, table
 from ..points.parameters.laws import Between, Law
+from ..still_walls import check_same_particles
 from .displacement import label_snapshots
 from .inputs import Inputs
 from .label_basis import LabelBasis
@@ -167,6 +168,7 @@ def training_scenes(
 
 
 def _refuse(first: Scene, scene: Scene, parameters: Mapping[str, float], run: bool = True) -> None:
+    check_same_particles(scene)
     refuse_unlike(first, scene, parameters, run)
     if not np.array_equal(first.state.position, scene.state.position):
         said = ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
