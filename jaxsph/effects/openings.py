@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -198,6 +200,9 @@ class Openings(Effect):
         openings: as many as there are.
         rate: [1/s], within the stability of the step.
         parking: where particles wait that are in no flow (static).
+
+    Raises:
+        ValueError: from a scene, if a reserve is shorter than the kernel's support.
     """
 
     openings: tuple[Opening, ...]
@@ -218,6 +223,16 @@ class Openings(Effect):
         rate = jnp.max(jnp.stack([self.rate, *rates]))
         acting = rate > 0.0
         return jnp.where(acting, _STABLE / jnp.where(acting, rate, 1.0), jnp.inf)
+
+    def step_limit_from(self, position, fluid, space):
+        for opening in self.openings:
+            if opening.reserve < space.support:
+                raise ValueError(
+                    f"opening: a reserve of {opening.reserve:.3g} m is shorter than the kernel's "
+                    f"support of {space.support:.3g} m; particles that come out of it would miss "
+                    "some of their neighbours. Take half as much again as that."
+                )
+        return math.inf
 
     def governed(self, context, fields, rates):
         position, velocity, density = (fields[name] for name in ("position", "velocity", "density"))

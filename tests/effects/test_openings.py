@@ -320,12 +320,21 @@ def test_derivatives_are_those_of_the_flow():
     assert float(both[1] - both[0]) / (2.0 * step) == pytest.approx(float(forward), rel=1e-5)
 
 
+def short_reserve():
+    scene = stream()
+    *others, ends = scene.effects
+    inlet = dataclasses.replace(ends.openings[0], reserve=0.1)
+    ends = dataclasses.replace(ends, openings=(inlet, *ends.openings[1:]))
+    return dataclasses.replace(scene, effects=(*others, ends))
+
+
 @pytest.mark.parametrize(
     "make, message",
     [
         (lambda: an_opening(inward=0.5), "inward is 1.0 or -1.0, got 0.5"),
         (lambda: an_opening(cell=0.0), "cells must be wider than zero"),
         (lambda: dataclasses.replace(an_opening(), axis=2), "axis 2 in 2 dimensions"),
+        (short_reserve, "a reserve of 0.1 m is shorter than the kernel's support of 0.375 m"),
         (lambda: an_opening(reserve=1.0), "a reserve of 1 m in a buffer of 1 m"),
         (lambda: an_opening(pressure=jnp.zeros(())), "a pressure and its rate belong together"),
         (lambda: OpenEnds(spare=-0.1), "spare: a share of at least 0, got -0.1"),
