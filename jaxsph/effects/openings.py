@@ -15,6 +15,7 @@ from ..ramps import ramp
 from .base import Effect
 
 _FRONT = 0.7  # of the way from the mouth to the reserve
+_WITHIN = 1.0 - 1e-6  # of the front: a row of a lattice may lie on its very end, by round-off
 _LEAST = 1e-3  # particles in a cell that has a mean of its own
 _STABLE = 2.0  # over the rate; RK4 stands 2.78
 
@@ -136,8 +137,8 @@ class Opening(eqx.Module):
         Means over cells across the mouth, linear between them; the mean of all where one is empty,
         a particle's own values where no particle is in the front.
         """
-        depth = self.depth(position)
-        inside = self.spans(position) & (depth >= 0.0) & (depth <= _FRONT * self.before_reserve)
+        depth, end = self.depth(position), _WITHIN * _FRONT * self.before_reserve
+        inside = self.spans(position) & (depth >= 0.0) & (depth < end)
         weighed = jnp.concatenate([values, jnp.ones_like(values[:, :1])], axis=1)
         weighed = jnp.where(inside[:, None], weighed, 0.0)
         corners, cells = self._corners(position)
