@@ -54,9 +54,7 @@ def lowered(model, state):
 def test_eight_devices_are_one(scene, steps):
     """31 x 31 particles divide into no eight equal shares; their list is rebuilt on the way.
     Who is put in through an opening is the same particle."""
-    # compiled sooner, without most optimizations, eight devices and one differ by 1e-4 after a step
-    # through openings, where right-hand sides do not; as users compile it they are the same
-    difference = found("run", scene, steps, soon=scene != "openings")
+    difference = found("run", scene, steps)
     assert difference.pop("way_over_half_skin") > 1.0  # so a list was built in mid-run
     assert all(0.0 <= d < ROUND_OFF for d in difference.values()), difference
 

@@ -7,6 +7,7 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax import lax
 from jaxtyping import Array, Bool, Float
 
 from ..parking import Parking
@@ -167,10 +168,13 @@ class Opening(eqx.Module):
             along = (position[:, k] - self.lower[k]) * (count / length) - 0.5
             if k not in self.periodic:
                 along = jnp.clip(along, 0.0, count - 1.0)
-            first = jnp.floor(along)
-            second_share = along - first
-            first = first.astype(jnp.int32)
-            sides = ((first % count, 1.0 - second_share), ((first + 1) % count, second_share))
+            # the nearest and both beside it, not a floor and the next: rows of a lattice lie on the
+            # middles, and a compiled program may hold two floors that are rounded either way
+            nearest = jnp.round(lax.stop_gradient(along))
+            sides = []
+            for step in (-1.0, 0.0, 1.0):
+                share = jnp.maximum(1.0 - jnp.abs(along - (nearest + step)), 0.0)
+                sides.append(((nearest + step).astype(jnp.int32) % count, share))
             corners = [
                 (cell * count + own, share * part) for cell, share in corners for own, part in sides
             ]
