@@ -27,8 +27,9 @@ CHECKS = {
     "16_from_an_outline_to_its_drag": ("error", 0.02, "of drag, unseen; measured 0.006"),
 }
 # tests/benchmarks/test_inverse.py, tests/docs/test_extend.py, tests/rom/points,
-# tests/scenes/test_free_flows.py and tests/io/test_vtkhdf.py have these problems, at small size
-SLOW = (5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16)
+# tests/scenes/test_free_flows.py, tests/sweeps and tests/io/test_vtkhdf.py have these problems, at
+# small size
+SLOW = (3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16)
 
 
 @pytest.mark.parametrize(

@@ -80,8 +80,15 @@ def stirred(scene):
     )
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("scheme", [Consistent(), DeltaPlus()], ids=["consistent", "delta-plus"])
+@pytest.mark.parametrize(
+    "scheme, dim",
+    [
+        pytest.param(Consistent(), 2, id="consistent-2"),
+        pytest.param(Consistent(), 3, id="consistent-3", marks=pytest.mark.slow),
+        pytest.param(DeltaPlus(), 2, id="delta-plus-2"),
+        pytest.param(DeltaPlus(), 3, id="delta-plus-3"),
+    ],
+)
 @pytest.mark.run_once
 def test_walls_get_what_the_fluid_loses(scheme, dim):
     """Force on all walls, weight and rate of momentum, for what conserves momentum in the fluid;
@@ -342,6 +349,7 @@ def test_parts_that_hold_nothing_or_twice_are_refused(regions, message):
         jaxsph.Walls.around(region, space, parts=parts)
 
 
+@pytest.mark.slow
 def test_a_tank_with_dry_walls_gets_what_its_water_loses():
     """Ghosts above the water line have no volume; their empty slots gave forces of NaN."""
     scene = sloshing(24)

@@ -73,12 +73,12 @@ _DEEP = (
 
 CONSISTENT = (
     Case("consistent/kicked", "closed box of 16 x 16, jittered, Re = 1e6, kicked by 0.02 U, 10 s",
-         partial(_kicked, 16, 10.0), (DENSITY, DECAY, WALLS)),
+         partial(_kicked, 16, 10.0), (DENSITY, DECAY, WALLS), slow=True),
     _case("tank-re-1e6", "tank of 16 x 16 jittered particles at Re = 1e6, 20 s", TANK,
           hydrostatic_tank, resolution=16, reynolds=1e6, end_time=20.0,
           arrangement=JitteredLattice()),
     _case("cavity-re-5e3", "cavity at Re = 5000, 20 x 20, 4 s", CAVITY,
-          lid_driven_cavity, resolution=20, reynolds=5e3, end_time=4.0),
+          lid_driven_cavity, slow=True, resolution=20, reynolds=5e3, end_time=4.0),
     _case("cavity-wide-kernel", "cavity of 24 x 24 with h = 4 dx, Re = 1000, 8 s", CAVITY,
           lid_driven_cavity, slow=True, resolution=24, reynolds=1e3, h_over_dx=4.0,
           end_time=8.0),

@@ -158,7 +158,7 @@ LONG = (
     *(_vortex_case(f"re-{n}-long", f"Re = {n}, 100 x 100, 20 s", 100, re, 20.0, slow=True)
       for re, n in _RE),
     *(_vortex_case(f"from-{n}", f"started on the {n} arrangement, 24 x 24, 2 s", arrangement=a,
-                   slow=n != "lattice") for n, a in _ARRANGEMENTS),
+                   slow=True) for n, a in _ARRANGEMENTS),
     *(_vortex_case(f"from-{n}-re-1e6", f"Re = 1e6 from the {n} arrangement, 64 x 64, 10 s",
                    64, 1e6, 10.0, a, slow=True, wrong=_STICKS if n == "jittered" else "")
       for n, a in _ARRANGEMENTS),
@@ -171,9 +171,10 @@ LONG = (
 )  # fmt: skip
 
 WALLED = (
-    _cavity_case("re-1e3", "Re = 1000, 20 x 20, 4 s from rest", 20, 1e3, 4.0),
+    _cavity_case("re-1e3", "Re = 1000, 20 x 20, 4 s from rest", 20, 1e3, 4.0, slow=True),
     _cavity_case("re-5e3", "Re = 5000, 20 x 20, 4 s from rest", 20, 5e3, 4.0),
-    _cavity_case("float32", "single precision, Re = 1000, 20 x 20, 2 s", 20, 1e3, 2.0, "float32"),
+    _cavity_case("float32", "single precision, Re = 1000, 20 x 20, 2 s", 20, 1e3, 2.0, "float32",
+                 slow=True),
     _cavity_case("re-1e3-long", "Re = 1000, 50 x 50, 20 s", 50, 1e3, 20.0, slow=True),
     _cavity_case("re-5e3-long", "Re = 5000, 50 x 50, 20 s", 50, 5e3, 20.0, slow=True),
     _cavity_case("float32-long", "single precision, Re = 5000, 50 x 50, 20 s",
@@ -181,7 +182,7 @@ WALLED = (
     _cavity_case("float32-long-damped", "the same with artificial viscosity, alpha = 0.01",
                  50, 5e3, 20.0, "float32", slow=True, make=_damped_cavity),
     _tank_case("rest", "20 x 20, 5 s at rest under gravity", 20, 5.0),
-    _tank_case("float32", "single precision, 20 x 20, 5 s at rest", 20, 5.0, "float32"),
+    _tank_case("float32", "single precision, 20 x 20, 5 s at rest", 20, 5.0, "float32", slow=True),
     _tank_case("rest-long", "50 x 50, 100 s at rest under gravity", 50, 100.0, slow=True),
     _tank_case("float32-long", "single precision, 50 x 50, 100 s", 50, 100.0, "float32", slow=True),
     Case("open-cavity/shedding-long", "dx = 5 mm, 12 s: some 17 periods of shedding",
@@ -190,7 +191,7 @@ WALLED = (
 
 STEPS = (
     *(Case(f"step/{c:g}-h-over-c0", f"a vortex with dt = {c:g} h / c0; 1.5 is the limit",
-           partial(_courant_vortex, c), VORTEX) for c in (0.5, 1.0, 1.5)),
+           partial(_courant_vortex, c), VORTEX, slow=c == 0.5) for c in (0.5, 1.0, 1.5)),
     *(Case(f"step/{c:g}-h-over-c0-scene", f"a scene built with dt = {c:g} h / c0, over the limit",
            partial(_courant_vortex, c), endings=(Ending.REFUSED,),
            says="time step: .* is beyond the stability limit of .* choose one below it")

@@ -14,7 +14,9 @@ def space(resolution):
     return Space(Box((-2.0, -2.0), (2.0, 2.0), (False, False)), WendlandC2(), 2.0 * dx, dx)
 
 
-@pytest.mark.parametrize("resolution", [9, 10, 21, 24.7, 25, 25.3, 50, 81])
+@pytest.mark.parametrize(
+    "resolution", [9, 10, 21, 24.7, 25, 25.3, 50, pytest.param(81, marks=pytest.mark.slow)]
+)
 def test_squares_of_the_particles_fill_the_disc(resolution):
     room = space(resolution)
     position = np.asarray(Rings(1.0).positions(room))

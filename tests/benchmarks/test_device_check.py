@@ -15,6 +15,7 @@ from jaxsph.scenes import taylor_green
 TINY = ["--sides", "16", "--sides-3d", "--dtypes", "float32", "--vortex", "16", "--members", "50"]
 
 
+@pytest.mark.slow
 def test_it_measures_all_and_fails_where_a_result_is_not_the_cpus(tmp_path, monkeypatch):
     monkeypatch.setattr(device_check, "differences", lambda: {"cavity": 1e-15, "vortex": 2e-9})
     path = tmp_path / "out.json"

@@ -28,6 +28,7 @@ def test_viscosity_from_noisy_probes():
     assert found["losses"][-1] < found["losses"][0]
 
 
+@pytest.mark.slow
 def test_the_field_that_a_flow_started_from():
     found = initial_field.solve(side=12, end_time=0.04, probes=12, steps=12)
     assert found["loss_reduced_by"] > 100.0  # a thousand takes more steps

@@ -1,10 +1,13 @@
 """Scenes at sizes of nobody's choice: every ending has its row and its reason."""
 
+import pytest
+
 from benchmarks.measure import read_json
 from benchmarks.scene_sizes import cases, main, run
 from jaxsph.scenes import SCENES
 
 
+@pytest.mark.slow
 def test_five_odd_sizes_a_scene_and_fewer_neighbours_in_space():
     found = cases(["taylor-green", "taylor-green-3d"], 10)
     assert len(found) == 10 and all(case["resolution"] % 2 for case in found)

@@ -46,6 +46,7 @@ def test_the_command_line_runs_it(tmp_path, monkeypatch):
     assert found.metadata["parameters"]["force"] == 0.3
 
 
+@pytest.mark.slow
 def test_a_drawn_body_is_dragged_along_and_not_to_a_side(shown):
     force = run_scene(shown["tunnel"]()).forces["ellipse"]
     assert (force[1:, 0] > 0.03).all()  # a body force of 0.5 m/s^2 has just set the fluid going

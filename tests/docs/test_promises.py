@@ -24,12 +24,11 @@ VERSIONS = {row[0].strip("`"): row[1:3] for row in ROWS if row[0].startswith("`"
 @pytest.mark.parametrize("row", PROMISES, ids=lambda row: row[0][:50])
 def test_a_promise_names_tests_that_run_as_often_as_it_says(row):
     files = [ROOT / name for name in re.findall(r"`(tests/[\w/]+\.py)`", row[2])]
-    assert files
-    for file in files:
-        text = file.read_text()
-        tests, marks = text.count("\ndef test_"), text.count("mark.slow")
-        assert tests > text.count("\n@pytest.mark.slow")  # some run with each change
-        assert ("each release" in row[3]) == (marks > 0), file
+    texts = [file.read_text() for file in files]
+    assert texts
+    for text in texts:
+        assert text.count("\ndef test_") > text.count("\n@pytest.mark.slow")  # some, each change
+    assert ("each release" in row[3]) == any("mark.slow" in text for text in texts)
 
 
 def test_files_are_of_the_versions_that_the_page_says(tmp_path):

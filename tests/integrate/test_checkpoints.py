@@ -50,7 +50,14 @@ def test_segments_keep_what_is_asked_for_and_grow_as_the_root():
         segment_length(100, 1, 0)
 
 
-@pytest.mark.parametrize("make", [gradients.periodic, gradients.walled, gradients.reduced])
+@pytest.mark.parametrize(
+    "make",
+    [
+        gradients.periodic,
+        pytest.param(gradients.walled, marks=pytest.mark.slow),  # tests/test_wall_sums.py has it
+        gradients.reduced,
+    ],
+)
 @pytest.mark.run_once
 def test_gradients_through_the_loop_against_differences(make):
     """Through rebuilt lists, walls, the shift velocity's limiter, and a reduced model."""

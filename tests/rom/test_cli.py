@@ -135,6 +135,7 @@ def test_a_memory_length_is_a_time_or_a_rule():
     assert memory_length("convective") == ConvectiveMemory()
 
 
+@pytest.mark.slow
 def test_models_on_reference_points_beside_those_on_particles(tmp_path, capsys):
     arguments = ["run", "taylor-green", "--resolution", "16", "--t-end", "0.06", "--hyper", "none",
                  "tensor", "--train", "100", "200", "--predict", "150", "--modes", "2",

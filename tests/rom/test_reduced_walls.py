@@ -164,6 +164,7 @@ def test_most_of_the_settling_runs_at_half_the_resolution(tmp_path, monkeypatch)
     assert np.linalg.norm(fine.velocity[0], axis=1).mean() == pytest.approx(before, rel=0.1)
 
 
+@pytest.mark.slow
 def test_local_bases_from_one_line(tmp_path, capsys):
     arguments = ["run", "lid-driven-cavity", "--resolution", "12", "--t-end", "0.08",
                  "--train", "50", "100", "150", "--predict", "75", "125", "--modes", "2",

@@ -110,7 +110,10 @@ def reconstructed(scene, full, modes):
 # that time is half the sound of the lid's sudden start)
 @pytest.mark.parametrize(
     "make, end_time, modes, velocity, pressure",
-    [(taylor_green, 0.3, 8, 0.015, 0.08), (lid_driven_cavity, 1.5, 16, 0.07, 0.6)],
+    [
+        (taylor_green, 0.3, 8, 0.015, 0.08),
+        pytest.param(lid_driven_cavity, 1.5, 16, 0.07, 0.6, marks=pytest.mark.slow),
+    ],
 )
 def test_moving_particles_of_the_consistent_scheme(make, end_time, modes, velocity, pressure):
     scene = make(16, 100.0, arrangement=Lattice(), end_time=end_time, scheme=Consistent())

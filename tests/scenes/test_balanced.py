@@ -14,6 +14,7 @@ def amplitude(trajectory):
     return (trajectory.pressure * wave).sum(axis=1) / (wave**2).sum(axis=1)
 
 
+@pytest.mark.slow
 def test_pressure_swings_less_from_a_balanced_start():
     scene = taylor_green(32, 100.0, arrangement=Stirred(), end_time=0.1)
     quiet = balanced(scene)

@@ -8,8 +8,10 @@ from jaxsph.scenes import channel_cylinder, poiseuille_open
 from jaxsph.scenes.poiseuille_open import LENGTH, MEAN
 from jaxsph.scenes.record import scene_from_record
 
+ENDS = [pytest.param(("fringe", 2.0), marks=pytest.mark.slow), ("openings", 4.0)]
 
-@pytest.fixture(scope="module", params=[("fringe", 2.0), ("openings", 4.0)], ids=str)
+
+@pytest.fixture(scope="module", params=ENDS, ids=str)
 def flow(request):
     ends, end_time = request.param  # through openings a plug's start rings for longer
     scene = poiseuille_open(16, ends=ends, end_time=end_time)

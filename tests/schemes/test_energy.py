@@ -90,14 +90,14 @@ def growth(scene):
     "options",
     [
         dict(side=12, periodic=True),
-        dict(side=8, jitter=0.0),
+        pytest.param(dict(side=8, jitter=0.0), marks=pytest.mark.slow),
         dict(side=8),
         pytest.param(dict(side=8, jitter=0.4), marks=pytest.mark.slow),
         pytest.param(dict(side=8, h_over_dx=1.5), marks=pytest.mark.slow),
         pytest.param(dict(side=10, h_over_dx=3.0), marks=pytest.mark.slow),
-        dict(side=14, region=CORNERED),
+        pytest.param(dict(side=14, region=CORNERED), marks=pytest.mark.slow),
         dict(side=8, viscosity=0.1),
-        dict(side=5, dim=3),
+        pytest.param(dict(side=5, dim=3), marks=pytest.mark.slow),
     ],
     ids=str,
 )

@@ -58,7 +58,9 @@ def film(scene):
     return dataclasses.replace(scene, state=jax.tree.map(lambda a: a[layer], scene.state))
 
 
-@pytest.mark.parametrize("options", [dict(side=14), dict(side=10, dim=3)], ids=str)
+@pytest.mark.parametrize(
+    "options", [dict(side=14), pytest.param(dict(side=10, dim=3), marks=pytest.mark.slow)], ids=str
+)
 def test_a_film_slides_along_its_wall(options):
     scene = film(of(WALLS, **options))
     found = rates_of(scene)(disturbed(scene)).velocity
@@ -142,6 +144,7 @@ def test_pairs_that_meet_gain_no_energy_on_the_average(step):
         assert ratio.mean() < 1.0 and ratio.max() < 1.5
 
 
+@pytest.mark.slow
 def test_still_water_stays_level():
     found = run_scene(still_water(2, 8, end=6.0))
     level = 2.0 * found.position[:, :, 1].mean(axis=1)

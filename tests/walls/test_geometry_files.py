@@ -48,6 +48,7 @@ def test_drawings_are_read(tmp_path):
     np.testing.assert_allclose(disc, exact, atol=0.02 * 0.5)  # by how finely it draws arcs
 
 
+@pytest.mark.slow
 def test_a_ball_s_surface_is_that_of_the_ball(tmp_path):
     path, radius, spacing = tmp_path / "ball.stl", 0.5, 0.05
     trimesh.creation.icosphere(subdivisions=4, radius=1e3 * radius).export(str(path))
