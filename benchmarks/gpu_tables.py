@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from .table_text import Row, markdown, results, short
@@ -82,6 +83,22 @@ def device_differences() -> str:
             for row in rows
         ),
     )  # fmt: skip
+
+
+def sums_on_a_gpu() -> str:
+    """What a right-hand side takes on one GPU, on paper."""
+    rows = [row for row in results("scale") if row["devices"] == 1]
+    return markdown(
+        ("", "floor [ms]", "estimate [ms]"),
+        [
+            (
+                f"10^{round(math.log10(row['particles']))} in {row['dim']}D",
+                short(1e3 * row["floor_seconds"]),
+                short(1e3 * row["right_hand_side_seconds"]),
+            )
+            for row in rows
+        ],
+    )
 
 
 def scale() -> str:

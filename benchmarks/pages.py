@@ -22,7 +22,7 @@ from .full_tables import (
     still_water,
     versions,
 )
-from .gpu_tables import ahead_of_time, device_differences, devices, scale
+from .gpu_tables import ahead_of_time, device_differences, devices, scale, sums_on_a_gpu
 from .reduced_tables import (
     cheapest_settings,
     density_readings,
@@ -95,6 +95,7 @@ TABLES: dict[str, Callable[[], str]] = {
         particle_step,
         versions,
         ahead_of_time,
+        sums_on_a_gpu,
         scale,
         devices,
         device_differences,

@@ -56,7 +56,8 @@ def estimate(dim: int, particles: int, devices: int) -> dict[str, Any]:
     count = counts(dim)
     own, link = particles / devices, LINKS[devices]
     read = SIZE * own * (_PASSES * (count["slots"] + 2 * dim) + count["sent"])
-    sums = BEHIND * read / BANDWIDTH + START * count["operations"]
+    floor = read / BANDWIDTH
+    sums = BEHIND * floor + START * count["operations"]
     listing = (count["list_over_sums"] - count["sort_over_sums"]) * sums
     listing = listing + count["sort_over_sums"] * sums * devices  # of all particles, on each
     list_share = listing / (STAGES * STEPS_PER_LIST)
@@ -78,6 +79,8 @@ def estimate(dim: int, particles: int, devices: int) -> dict[str, Any]:
         "dim": dim,
         "particles": particles,
         "devices": devices,
+        "floor_seconds": floor,
+        "right_hand_side_seconds": sums,
         **{f"{name}_seconds": taken + STAGES * sent[name] / link for name in sent},
         **{f"{name}_efficiency": alone / (taken + STAGES * sent[name] / link) for name in sent},
         **{f"{name}_gigabytes": (lists + SIZE * held[name]) / 1e9 for name in held},

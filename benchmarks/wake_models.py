@@ -33,9 +33,10 @@ from .measure import format_rows, number, progress
 from .table import Table, command
 from .wake_runs import WakeRuns, harmonic
 
-KEY = ("resolution", "trained_on", "modes", "closure", "reynolds", "seconds_of_flow")
+KEY = ("resolution", "trained_on", "recorded", "modes", "closure", "reynolds", "seconds_of_flow")
 UNSEEN = {95.0: 18.0, 125.0: 60.0}  # Reynolds number: s of flow
 _TIMED = 8  # snapshots of the full run that are timed beside the reduced one
+COMPARED = ("strouhal", "drag", "lift_amplitude")
 _DIFFERENCE = 1e-3  # of the Reynolds number
 
 
@@ -51,6 +52,14 @@ def _arguments(add) -> None:
         help="default: 80 110 140")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", default=[8, 14, 20], metavar="M",
         help="default: 8 14 20")  # fmt: skip
+    add("--recorded", type=positive_float, default=18.0, metavar="S",
+        help="of flow in each training run [s] (default: 18)")  # fmt: skip
+    add("--unseen", type=positive_float, nargs="+", default=list(UNSEEN), metavar="RE",
+        help="default: 95 125")  # fmt: skip
+    add("--seconds", type=positive_float, metavar="S",
+        help="of an unseen flow that are followed (default: 18 at 95, else 60)")  # fmt: skip
+    add("--twice", action="store_true",
+        help="a second full run beside each, of particles moved by 0.001 dx")  # fmt: skip
     add("--closure", choices=("none", "linear"), default="none", help="default: none")
     add("--out", type=Path, default=Path("out/wake"), metavar="DIR",
         help="where runs are kept (default: %(default)s)")  # fmt: skip
@@ -58,19 +67,21 @@ def _arguments(add) -> None:
 
 def _run(options) -> bool:
     kept = Table(options.json, KEY, beside=lambda rows: {"environment": environment()})
-    shared = (options.resolution, "-".join(f"{r:g}" for r in options.train))
+    trained_on = "-".join(f"{r:g}" for r in options.train)
+    shared = (options.resolution, trained_on, options.recorded)
+    unseen = [(re, options.seconds or UNSEEN.get(re, 60.0)) for re in options.unseen]
     cases = [
-        dict(zip(KEY, (*shared, modes, options.closure, *unseen), strict=True))
+        dict(zip(KEY, (*shared, modes, options.closure, *each), strict=True))
         for modes in options.modes
-        for unseen in UNSEEN.items()
+        for each in unseen
     ]
     left = list(kept.left(cases))
     if left:
-        runs = WakeRuns(options.out, options.resolution)
+        runs = WakeRuns(options.out, options.resolution, recorded=options.recorded)
         models = _models(runs, options, sorted({case["modes"] for case in left}))
         for modes, (model, drag) in models:
             for case in (case for case in left if case["modes"] == modes):
-                kept.add(case | judge(model, drag, runs, case))
+                kept.add(case | judge(model, drag, runs, case, options.twice))
     print(_table(kept.rows))
     return any(row["fault"] for row in kept.rows)
 
@@ -93,8 +104,8 @@ def _models(runs: WakeRuns, options, sizes):
         yield model.flow.basis.size, (model, fit_forces(model, full, "cylinder"))
 
 
-def judge(model, forces, runs: WakeRuns, case: dict[str, Any]) -> dict[str, Any]:
-    """A prediction at an unseen number beside the full run."""
+def judge(model, forces, runs: WakeRuns, case: dict[str, Any], twice: bool) -> dict[str, Any]:
+    """A prediction at an unseen number beside the full run, and a second one of these."""
     reynolds, seconds = case["reynolds"], case["seconds_of_flow"]
     scene, full = runs.run(reynolds, seconds)
     reduced = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
@@ -106,13 +117,16 @@ def judge(model, forces, runs: WakeRuns, case: dict[str, Any]) -> dict[str, Any]
     }
     if row["fault"]:
         return row
-    theirs = 2.0 * full.mean_forces["cylinder"] / (SPEED**2 * DIAMETER)
     values = jnp.asarray(reduced.values[0])
     mine = 2.0 * np.asarray(forces(jnp.asarray(reduced.coordinates[0]), values))
     mine /= SPEED**2 * DIAMETER
     mine[1:] = 0.5 * (mine[1:] + mine[:-1])  # means between snapshots, as theirs are
     late = full.time > 0.5 * full.time[-1]
-    wave, true = (harmonic(full.time[late], *each[late].T) for each in (mine, theirs))
+
+    def wave_of(each):
+        return harmonic(full.time[late], *each[late].T)
+
+    true = wave_of(_coefficients(full))
     flow = model.flow
     fields = np.moveaxis(mapped_run(flow.reference, full, flow.fluid), -1, 0)
     modes, centre = (np.asarray(part) for part in (flow.basis.modes, flow.basis.centre))
@@ -126,26 +140,33 @@ def judge(model, forces, runs: WakeRuns, case: dict[str, Any]) -> dict[str, Any]
         100.0 * np.linalg.norm((each - fields)[:, :, 1:], axis=(1, 2)).max() / largest
         for each in (found, best)
     )
-    again = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
-    apart = (wave["phase"] - true["phase"]) / (2.0 * np.pi)
-    periods = true["strouhal"] * seconds
+    timed = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
+    again = wave_of(_coefficients(runs.run(reynolds, seconds, True)[1])) if twice else None
     return row | {
-        "strouhal": wave["strouhal"],
-        "strouhal_full": true["strouhal"],
-        "strouhal_error_percent": 100.0 * abs(wave["strouhal"] / true["strouhal"] - 1.0),
-        "drag": wave["drag"],
-        "drag_full": true["drag"],
-        "drag_error_percent": 100.0 * abs(wave["drag"] / true["drag"] - 1.0),
-        "lift_amplitude": wave["lift_amplitude"],
-        "lift_amplitude_full": true["lift_amplitude"],
-        "lift_error_percent": 100.0 * abs(wave["lift_amplitude"] / true["lift_amplitude"] - 1.0),
-        "periods": periods,
-        "phase_error_percent_of_a_period": 100.0 * abs((apart + 0.5) % 1.0 - 0.5),
+        **{f"{name}_full": true[name] for name in COMPARED},
+        **beside(wave_of(mine), true),
+        "full_again": None if again is None else beside(again, true),
+        "periods": true["strouhal"] * seconds,
         "velocity_error_percent": off,
         "velocity_floor_percent": floor,
-        "reduced_seconds": again.run_seconds,
-        "times_faster": row["full_seconds"] / again.run_seconds,
+        "reduced_seconds": timed.run_seconds,
+        "times_faster": row["full_seconds"] / timed.run_seconds,
         **_gradient(model, forces, scene, reynolds, full.time),
+    }
+
+
+def _coefficients(full):
+    return 2.0 * full.mean_forces["cylinder"] / (SPEED**2 * DIAMETER)
+
+
+def beside(wave: dict[str, float], true: dict[str, float]) -> dict[str, float]:
+    """A wake's figures, and how far from another's; the phase at the end, of a period."""
+    apart = (wave["phase"] - true["phase"]) / (2.0 * np.pi)
+    off = {name: 100.0 * abs(wave[name] / true[name] - 1.0) for name in COMPARED}
+    return {
+        **{name: wave[name] for name in COMPARED},
+        **{f"{name.removesuffix('_amplitude')}_error_percent": off[name] for name in COMPARED},
+        "phase_error_percent_of_a_period": 100.0 * abs((apart + 0.5) % 1.0 - 0.5),
     }
 
 

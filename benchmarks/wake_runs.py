@@ -15,6 +15,7 @@ from jaxsph.scenes.cylinder import DIAMETER, SPEED
 from jaxsph_rom.study import with_record
 
 DOMAIN = {"width": 6.0, "upstream": 4.0, "downstream": 6.0}  # m
+_NUDGE = 1e-3  # dx
 STEP, EACH = 1.5e-2, 20  # s, steps to a snapshot, for 10 particles a diameter
 
 
@@ -59,16 +60,25 @@ class WakeRuns:
         """A scene that goes on from a state of another."""
         return with_record(continued(scene, state, before.space), before=how)
 
-    def _run(self, reynolds: float, recorded: float | None = None) -> tuple[Scene, Trajectory]:
-        """The scene of what is recorded, and its run."""
+    def _run(
+        self, reynolds: float, recorded: float | None = None, nudged: bool = False
+    ) -> tuple[Scene, Trajectory]:
+        """The scene of what is recorded, and its run; from particles all of them a thousandth of a
+        spacing elsewhere, if it is nudged."""
         start, developed = self._from_start()
         adapting = self.after(
             start, developed.state(-1), self.scene(reynolds, self.adapted), "developed"
         )
         adapted = self._kept(f"adapt-{reynolds:g}", adapting)
         seconds = self.recorded if recorded is None else recorded
-        scene = self.after(adapting, adapted.state(-1), self.scene(reynolds, seconds), "adapted")
-        return scene, self._kept(f"record-{reynolds:g}-{seconds:g}s", scene)
+        state, how, name = adapted.state(-1), "adapted", f"record-{reynolds:g}-{seconds:g}s"
+        if nudged:
+            away = np.random.default_rng(0).normal(scale=_NUDGE, size=state.position.shape)
+            away = (away * adapting.space.spacing).astype(state.position.dtype)
+            state = dataclasses.replace(state, position=state.position + away)
+            how, name = f"{how}-nudged", f"{name}-nudged"
+        scene = self.after(adapting, state, self.scene(reynolds, seconds), how)
+        return scene, self._kept(name, scene)
 
     def _kept(self, name: str, scene: Scene) -> Trajectory:
         return run_scene(scene, path=self.folder / f"{name}.h5", progress=True)
