@@ -11,12 +11,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding
 from jax.sharding import PartitionSpec as Spec
 from jaxtyping import Array
 
 AXIS = "particles"
+_LONGEST = 2048  # bytes that one process tells the others
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,40 @@ class Devices:
         """Whether this process is the one of theirs that writes files: the first."""
         return jax.process_index() == min(device.process_index for device in self.every)
 
-    def meet(self, where: str) -> None:
+    def meet(self) -> None:
         """Wait until all their processes have come there."""
-        if self.processes > 1:
-            multihost_utils.sync_global_devices(where)
+        self.by_first(lambda: None)
+
+    def by_first(self, work: Callable[[], Any]) -> Any:
+        """What `work` gives, done by the process that writes files; None in their others, which
+        wait for it.
+
+        Raises:
+            Exception: what it raises; a ValueError that says the same in the others.
+        """
+        if self.processes == 1:
+            return work()
+        found, failure = None, None
+        if self.write_here:
+            try:
+                found = work()
+            except Exception as error:
+                failure = error
+        why = self._told("" if failure is None else str(failure) or repr(failure))
+        if failure is not None:
+            raise failure
+        if why:
+            raise ValueError(why)
+        return found
+
+    def _told(self, text: str) -> str:
+        """The text of the process that writes files, in all of theirs."""
+        own = np.frombuffer(text.encode()[:_LONGEST].ljust(_LONGEST, b"\0"), np.uint8)
+        shape, sharding = (self.count, _LONGEST), self._sharding(Spec(AXIS))
+        of_each = jax.make_array_from_callback(shape, sharding, lambda at: own[None])
+        first = min(range(self.count), key=lambda k: self.every[k].process_index)
+        told = np.asarray(self.whole(of_each))[first].tobytes().rstrip(b"\0")
+        return told.decode(errors="ignore")
 
     def known(self, tree: Any) -> Any:
         """The same arrays, so that this process has all of them to read."""

@@ -58,16 +58,17 @@ def kept_run(
     devices = Devices(jax.local_devices()[:1] if given is None else given)
     options |= {} if given is None else {"devices": devices}  # which may be read but once
     begun = read_trajectory(path) if done else None
-    devices.meet("before a run is written")
-    writer = _gone_on_with(path, begun) if done and devices.write_here else None
+    devices.meet()  # all have looked at the file as it was
     if done:
+        writer = devices.by_first(lambda: _gone_on_with(path, begun))
         state = restore(begun)
         if options.get("watch") is not None:
             metadata |= first_doubt(options["watch"], begun)
     else:
         state = start(made)
-        if devices.write_here:
-            writer = _begun(path, scene, made, state, done is not None, wanted, options)
+        writer = devices.by_first(
+            lambda: _begun(path, scene, made, state, done is not None, wanted, options)
+        )
     with writer or nullcontext(), progress(done or 0) as report:
         part = simulate(
             made,
@@ -79,9 +80,8 @@ def kept_run(
             metadata=metadata,
             **options,
         )
-        if writer is not None:
-            writer.finish(part.metadata)
-    devices.meet("after a run was written")
+        devices.by_first(lambda: writer.finish(part.metadata))
+    devices.meet()  # the file is closed
     return _whole(path, scene)
 
 

@@ -100,7 +100,7 @@ def simulate(
         devices: that run a full model together, each its share of the particles and of their
             neighbours, as `jax.devices()`; results differ by rounding. One device if none are
             given. Devices of several processes (`jax.distributed`) will do, if all call this alike;
-            the first of these alone tells `recorder`.
+            the first of these alone tells `recorder`, and what that raises they all raise.
 
     Raises:
         ValueError: if no whole interval is left to run, or `devices` are given for a model that one
@@ -132,6 +132,10 @@ def simulate(
     def known(tree):
         return tree if shared is None else shared.known(tree)
 
+    def tell(step, snapshot):
+        if recorder is not None:
+            recorder.append(step, step * time_step, snapshot)
+
     def record(step, snapshot, means=None):
         if measure is not None:
             loads = measure(model, jnp.asarray(step * time_step, dtype), state)
@@ -146,8 +150,10 @@ def simulate(
             raise _failed(fault)
         records.append(snapshot)
         times.append(step * time_step)
-        if recorder is not None and (shared is None or shared.write_here):
-            recorder.append(step, step * time_step, snapshot)
+        if shared is not None:
+            shared.by_first(lambda: tell(step, snapshot))
+        else:
+            tell(step, snapshot)
         if watch is not None and "doubt" not in metadata:
             found = doubt(watch, step * time_step, snapshot)
             metadata.update(found)

@@ -18,6 +18,7 @@ import equinox as eqx
 
 import jaxsph
 from jaxsph.arrangements import JitteredLattice
+from jaxsph.io import TrajectoryFileError, TrajectoryWriter
 from jaxsph.scenes import lid_driven_cavity, taylor_green
 
 SCENES = {
@@ -42,8 +43,31 @@ def fault(scene, devices=None):
         return str(error)
 
 
+def refused(scene, path, devices):
+    """What is said where the file cannot be written, by either process."""
+    try:
+        jaxsph.run_scene(scene, path, devices=devices)
+    except ValueError as error:
+        return str(error)
+
+
+def no_room(scene, path, devices):
+    """What is said where the disk takes no more after the first snapshot; one process has it."""
+    append = TrajectoryWriter.append
+
+    def full(writer, step, *others):
+        if step:
+            raise TrajectoryFileError(f"{path}: no room at step {step}.")
+        append(writer, step, *others)
+
+    TrajectoryWriter.append = full
+    return refused(scene, path, devices)
+
+
 if __name__ == "__main__":
     scene, devices = short(sys.argv[3]), jaxsph.Devices(jax.devices())
     assert (devices.count, devices.processes) == (4, 2)
     assert len(jaxsph.run_scene(scene, sys.argv[4], devices=devices).time) == 3
     print(fault(scene, devices))
+    print(refused(scene, sys.argv[4] + "/beside.h5", devices))
+    print(no_room(scene, sys.argv[4] + ".full", devices))

@@ -20,7 +20,8 @@ WORKER = Path(__file__).with_name("processes_worker.py")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["vortex", "cavity"])
 def test_two_processes_are_one(name, tmp_path):
-    """The file that the first of them writes, and what both say of a fault."""
+    """The file that the first of them writes, and what both say of a fault, of a file that cannot
+    be, and of a disk that is full."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{free.getsockname()[1]}"
@@ -44,4 +45,8 @@ def test_two_processes_are_one(name, tmp_path):
     alone = fault(scene)
     assert "particle" in alone
     for output, _ in said:
-        assert output.splitlines()[-1] == alone
+        of_a_fault, of_the_file, of_the_disk = output.splitlines()[-3:]
+        assert of_a_fault == alone
+        assert "beside.h5" in of_the_file
+        assert of_the_disk.endswith(".full: no room at step 3.")
+    assert len(jaxsph.io.read_trajectory(f"{path}.full").time) == 1

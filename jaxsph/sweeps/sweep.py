@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from ..clumping import Clumping
 from ..compiled import full_precision
 from ..compiler_options import platform_options
+from ..devices import Devices
 from ..integrate import FaultCode, integrate
 from ..io import Lock
 from ..scenes import Scene
@@ -66,25 +68,24 @@ def sweep(
     if batch < 1:
         raise ValueError(f"batch: at least 1, got {batch}.")
     members = stacked(scenes)
-    writes = jax.process_index() == 0
-    with Lock(Path(path)) if writes else nullcontext():
-        if writes:
-            sweep_file.create(path, scenes)
-        _fill(path, members, scenes[0], len(scenes), batch, writes, progress)
-    multihost_utils.sync_global_devices("sweep")  # the file is whole for all
+    every = Devices(jax.devices())
+    with every.by_first(lambda: Lock(Path(path))) or nullcontext():
+        every.by_first(lambda: sweep_file.create(path, scenes))
+        _fill(path, members, scenes[0], len(scenes), batch, every, progress)
+    every.meet()  # the file is whole for all
     return read_status(path)
 
 
-def _fill(path, members: Members, first: Scene, count: int, batch: int, writes, progress) -> None:
+def _fill(path, members: Members, first: Scene, count: int, batch: int, every, progress) -> None:
     """Run the members that are not in the file yet."""
-    code = read_status(path).code if writes else np.empty(count, np.int32)
-    code = multihost_utils.broadcast_one_to_all(code)
+    code = every.by_first(lambda: read_status(path).code)
+    code = multihost_utils.broadcast_one_to_all(np.empty(count, np.int32) if code is None else code)
     left = np.flatnonzero(code == NOT_RUN)
     if progress is not None and len(left) < count:
         progress(count - len(left))
     if not len(left):
         return
-    mesh = Mesh(np.asarray(jax.devices()), (_AXIS,))
+    mesh = Mesh(np.asarray(every.every), (_AXIS,))
     for attempt in range(1 + _ENLARGEMENTS):
         run = _compiled(members, first, mesh, batch)
         clumped = []
@@ -95,8 +96,8 @@ def _fill(path, members: Members, first: Scene, count: int, batch: int, writes, 
                 if status[0] == FaultCode.NEIGHBOR_OVERFLOW and attempt < _ENLARGEMENTS:
                     clumped.append(number)
                     continue
-                if writes:
-                    sweep_file.store(path, number, snapshots, status)
+                every.by_first(partial(sweep_file.store, path, number, snapshots, status))
+                if every.write_here:
                     _warn_of_clumps(first, number, snapshots, int(status[3]))
                 if progress is not None:
                     progress(1)

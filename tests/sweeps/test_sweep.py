@@ -35,6 +35,11 @@ from tests.sweeps.test_sweep import members
 status = sweep(members(int(sys.argv[6]) if len(sys.argv) > 6 else 10), sys.argv[2],
                progress=lambda _: print("member", flush=True))
 assert (status.code == 0).all()
+if len(sys.argv) > 3:  # a file in a folder that is none, known to one of the processes
+    try:
+        sweep(members(2), sys.argv[2] + "/beside.h5")
+    except ValueError as error:
+        print(error)
 """
 
 
@@ -88,9 +93,9 @@ def test_two_processes_make_one_file(tmp_path):
         address = f"127.0.0.1:{free.getsockname()[1]}"
     path = tmp_path / "sweep.h5"
     both = [started(2, path, address, 2, number, 5) for number in range(2)]
-    assert [process.wait(timeout=300) for process in both] == [0, 0]
-    for process in both:
-        process.stdout.close()
+    said = [process.communicate(timeout=300)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert all("beside.h5" in output for output in said)
     assert_is_single_runs(path, members(5))
 
 
