@@ -111,6 +111,14 @@ def _in_a_stream(
     return Run(scene if factor is None else _varying(scene, factor), about(scene, 40))
 
 
+def _nothing() -> Run:
+    """A tank with no water in it, nor behind its port."""
+    scene = filling_tank(20, end_time=1.0, dtype="float64")
+    place = jnp.tile(jnp.asarray(scene.parking.place), (len(scene.state.density), 1))
+    state = dataclasses.replace(scene.state, position=place)
+    return Run(dataclasses.replace(scene, state=state), about(scene, 20))
+
+
 def _filling(end_time: float, parked: int, factor: Callable | None = None) -> Run:
     """A tank 20 particles wide, with so many parked."""
     scene = filling_tank(20, end_time=end_time, dtype="float64")
@@ -169,6 +177,8 @@ OPEN = (
     Case("open/none-parked", "a tank that fills, four particles parked and more coming in",
          partial(_filling, 1.6, 4), endings=(Ending.FAULT,), says="park more of them",
          codes=(FaultCode.NONE_PARKED,)),
+    Case("open/all-parked", "a tank with no water in it, nor behind its port, all of it parked",
+         _nothing, endings=(Ending.REFUSED,), says="no particle starts in the reserve"),
     Case("open/buffers-vortex-leaves", "16 across, Re = 1000, a vortex leaves through an opening",
          partial(_vortex_leaves, 3.0, "openings"), LEAVING, slow=True),
     Case("open/tank-drains", "the tank's inflow turned round: it drains to the port's top, 6 s",

@@ -126,6 +126,11 @@ class Opening(eqx.Module):
         """Which particles have gone out at the end of the buffer."""
         return (self.depth(position) > self.length) & self.spans(position)
 
+    def in_reserve(self, position) -> Bool[Array, " particles"]:
+        """Which particles are in the reserve."""
+        depth = self.depth(position)
+        return (depth > self.before_reserve) & (depth <= self.length) & self.spans(position)
+
     def behind(self, position: Float[Array, "particles dim"]) -> Float[Array, "particles dim"]:
         """Places a reserve's length further out [m]."""
         return position.at[:, self.axis].add(-self.inward * self.reserve)
@@ -236,6 +241,12 @@ class Openings(Effect):
                     f"opening: a reserve of {opening.reserve:.3g} m is shorter than the kernel's "
                     f"support of {space.support:.3g} m; particles that come out of it would miss "
                     "some of their neighbours. Take half as much again as that."
+                )
+            if not opening.in_reserve(position).any():
+                low, up = (", ".join(f"{x:g}" for x in c) for c in (opening.lower, opening.upper))
+                raise ValueError(
+                    f"opening: no particle starts in the reserve of the one from ({low}) m to "
+                    f"({up}) m, and as many as start there come in again and again; fill it."
                 )
         return math.inf
 
