@@ -52,15 +52,41 @@ def light_bodies() -> str:
     )
 
 
+def channel_cylinder() -> str:
+    """Drag, lift and pressure difference of the cylinder in a channel."""
+    header = ("ghosts", "ends", "particles a diameter", "drag", "lift", "pressure difference [Pa]",
+              "mass flux off", "run [s]")  # fmt: skip
+    names = ("h_over_dx", "ghosts", "ends", "resolution")
+    rows = sorted(results("channel_cylinder"), key=lambda row: [row[name] for name in names])
+    return markdown(
+        header,
+        [
+            (
+                row["ghosts"] + ("" if row["h_over_dx"] == 1.5 else ", h = 2 dx"),
+                row["ends"],
+                short(row["across_cylinder"], 3),
+                f"{row['drag']:.3f} +- {row['drag_known_to']:.3f}",
+                f"{row['lift']:.3f} +- {row['lift_known_to']:.3f}",
+                short(row["pressure_difference"], 4),
+                f"{short(row['mass_flux_off_percent'], 2)} %",
+                f"{row['seconds']:.0f}",
+            )
+            for row in rows
+        ],
+    )
+
+
 def taylor_couette() -> str:
     """Torques between cylinders."""
-    header = ("turns", "to the inner radius", "torque, inner", "outer", "velocity")
+    header = ("ghosts", "turns", "to the inner radius", "torque, inner", "outer", "velocity")
     names = ("inner_torque_error_percent", "outer_torque_error_percent", "velocity_error_percent")
-    rows = sorted(results("taylor_couette"), key=lambda row: (row["turns"], row["resolution"]))
+    order = ("ghosts", "turns", "resolution")
+    rows = sorted(results("taylor_couette"), key=lambda row: [row[name] for name in order])
     return markdown(
         header,
         (
             (
+                row["ghosts"],
                 row["turns"],
                 str(row["resolution"]),
                 *(f"{short(row[name], 2)} %" for name in names),

@@ -25,11 +25,12 @@ from jaxsph.environment import environment
 from jaxsph.interpolation import MovingLeastSquaresMap
 from jaxsph.scenes import channel_cylinder
 from jaxsph.scenes.channel_cylinder import CYLINDER, DIAMETER, HEIGHT, LENGTH, MEAN
+from jaxsph.scenes.composed import GHOSTS
 
 from .measure import format_rows, number, progress
 from .table import Table, command
 
-KEY = ("resolution", "ends", "h_over_dx", "mach", "end_time")
+KEY = ("resolution", "ghosts", "ends", "h_over_dx", "mach", "end_time")
 LITERATURE = {  # at Re = 20; pascals
     "drag": (5.57, 5.59), "lift": (0.0104, 0.0110), "pressure_difference": (0.1172, 0.1176)
 }  # fmt: skip
@@ -46,6 +47,7 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--resolutions", type=positive_int, nargs="+", default=[33, 41, 66], metavar="N",
         help="particles across the channel, 4.1 times those across the cylinder")  # fmt: skip
+    add("--ghosts", choices=GHOSTS, default="rows", help="of the cylinder (default: rows)")
     add("--ends", choices=("fringe", "openings"), default="fringe", help="default: fringe")
     add("--h-over-dx", type=positive_float, default=1.5, metavar="X", help="default: 1.5")
     add("--mach", type=positive_float, default=0.1, metavar="M", help="default: 0.1")
@@ -54,14 +56,18 @@ def _arguments(add) -> None:
 
 def _run(options) -> None:
     kept = Table(options.json, KEY, beside=lambda rows: {"literature": LITERATURE})
-    shared = (options.ends, options.h_over_dx, options.mach, options.t_end)
+    shared = (options.ghosts, options.ends, options.h_over_dx, options.mach, options.t_end)
     cases = (dict(zip(KEY, (n, *shared), strict=True)) for n in options.resolutions)
     for case in kept.left(cases):
         kept.add(case | run(case))
-    head = ("resolution", "across D", "drag", "+-", "lift", "+-", "dp [Pa]", "flux %", "seconds")
+    head = ("resolution", "ghosts", "ends", "across D", "drag", "+-", "lift", "+-", "dp [Pa]",
+            "flux %", "seconds")  # fmt: skip
     names = ("across_cylinder", "drag", "drag_deviation", "lift", "lift_deviation",
              "pressure_difference", "mass_flux_off_percent", "seconds")  # fmt: skip
-    rows = [(str(r["resolution"]), *(number(r[name], 4) for name in names)) for r in kept.rows]
+    rows = [
+        (str(r["resolution"]), r["ghosts"], r["ends"], *(number(r[name], 4) for name in names))
+        for r in kept.rows
+    ]
     print(format_rows(head, rows))
 
 
@@ -69,6 +75,7 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     """Coefficients, and what they took."""
     scene = channel_cylinder(
         case["resolution"],
+        ghosts=case["ghosts"],
         ends=case["ends"],
         h_over_dx=case["h_over_dx"],
         mach=case["mach"],

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .body_tables import floating_box, light_bodies, taylor_couette
+from .body_tables import channel_cylinder, floating_box, light_bodies, taylor_couette
 from .full_tables import (
     cavity_of_pysph,
     dam_break_3d,
@@ -49,6 +49,7 @@ from .wake_tables import (
     drag_slopes,
     open_flux,
     wake_models,
+    wake_transients,
 )
 
 PAGES = ROOT / "docs" / "measured"
@@ -109,8 +110,10 @@ TABLES: dict[str, Callable[[], str]] = {
         cylinder_wake,
         drag_slopes,
         wake_models,
+        wake_transients,
         floating_box,
         light_bodies,
+        channel_cylinder,
         taylor_couette,
     )  # fmt: skip
 }

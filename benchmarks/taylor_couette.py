@@ -18,13 +18,14 @@ from jaxsph import run_scene
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.environment import environment
 from jaxsph.scenes import Scene, taylor_couette
+from jaxsph.scenes.composed import GHOSTS
 from jaxsph.scenes.taylor_couette import INNER, OUTER, CircularCouetteFlow
 from jaxsph.schemes import SCHEMES
 
 from .measure import format_rows, number, progress
 from .table import Table, command
 
-KEY = ("scheme", "turns", "resolution", "h_over_dx")
+KEY = ("scheme", "ghosts", "turns", "resolution", "h_over_dx")
 TURN, VISCOSITY, SOUND = 1.0, 0.05, 10.0  # rad/s, m^2/s, m/s
 END, SNAPSHOTS = 1.0, 20  # s; five times that in which friction evens a flow out
 RINGS = 8
@@ -42,20 +43,21 @@ def _arguments(add) -> None:
         help="default: sharp-at-walls")  # fmt: skip
     add("--turns", choices=("inner", "outer"), nargs="+", default=["inner", "outer"],
         help="default: one after the other")  # fmt: skip
+    add("--ghosts", choices=GHOSTS, default="rows", help="of the walls (default: rows)")
     add("--h-over-dx", type=positive_float, default=2.0, metavar="X", help="default: 2")
 
 
 def _run(options) -> None:
     kept = Table(options.json, KEY)
     cases = (
-        {"scheme": scheme, "turns": turns, "resolution": n, "h_over_dx": options.h_over_dx}
+        dict(zip(KEY, (scheme, options.ghosts, turns, n, options.h_over_dx), strict=True))
         for n in options.resolutions
         for scheme in options.schemes
         for turns in options.turns
     )
     for case in kept.left(cases):
         kept.add(case | run(case))
-    names = ("scheme", "turns", "resolution")
+    names = ("scheme", "ghosts", "turns", "resolution")
     found = ("inner_torque_error_percent", "outer_torque_error_percent", "velocity_error_percent")
     rows = [(*(str(r[n]) for n in names), *(number(r[n], 3) for n in found)) for r in kept.rows]
     print(format_rows((*names, "inner %", "outer %", "velocity %"), rows))
@@ -108,6 +110,7 @@ def annulus(case: dict[str, Any]) -> tuple[Scene, CircularCouetteFlow]:
         case["resolution"],
         TURN * radius * (OUTER - INNER) / VISCOSITY,
         **turns,
+        ghosts=case["ghosts"],
         h_over_dx=case["h_over_dx"],
         time_step=END / (SNAPSHOTS * steps),
         end_time=END,

@@ -2,13 +2,14 @@
 
     python -m benchmarks.wake_models --modes 8 14 20
 
-A model on points of runs of the developed wake at three Reynolds numbers, tensors without a
-closure unless one is asked for. At unseen numbers it starts where the full run starts and is
-followed for as long as that; drag and lift are outputs learnt on the training runs (`fit_forces`).
-Both runs' lift is a sine over their second half: Strouhal numbers and amplitudes are those of it,
-the phase is that at its end. Beside them the error of the velocity over all points and times, its
-floor, and the time, the full model's by some steps in the same process. Runs are kept in a folder,
-results as they come: the same command goes on where it was cut short.
+A model on points of runs at three Reynolds numbers, of the developed wake or of one that begins to
+shed from the steady wake of Re = 40 (`--start steady`), tensors without a closure unless one is
+asked for. At unseen numbers it starts where the full run starts and is followed for as long as
+that; drag and lift are outputs learnt on the training runs (`fit_forces`). Both runs' lift is a
+sine over their second half, their last third from a steady wake: Strouhal numbers and amplitudes
+are those of it, the phase is that at its end. Beside them the error of the velocity over all points
+and times, its floor, and the time, the full model's by some steps in the same process. Runs are
+kept in a folder, results as they come: the same command goes on where it was cut short.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import time as clock
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,13 +32,32 @@ from jaxsph_rom.points import fit_forces, mapped_run, train_each
 
 from .measure import format_rows, number, progress
 from .table import Table, command
-from .wake_runs import WakeRuns, harmonic
+from .wake_runs import WakeRuns, harmonic, onset
 
-KEY = ("resolution", "trained_on", "recorded", "modes", "closure", "reynolds", "seconds_of_flow")
-UNSEEN = {95.0: 18.0, 125.0: 60.0}  # Reynolds number: s of flow
+KEY = ("resolution", "start", "trained_on", "recorded", "modes", "closure", "reynolds",
+       "seconds_of_flow")  # fmt: skip
+UNSEEN = {95.0: 18.0, 125.0: 60.0}  # Reynolds number: s of flow of a developed wake
 _TIMED = 8  # snapshots of the full run that are timed beside the reduced one
 COMPARED = ("strouhal", "drag", "lift_amplitude")
 _DIFFERENCE = 1e-3  # of the Reynolds number
+
+
+class Start(NamedTuple):
+    """What the runs of a table start from."""
+
+    recorded: float  # s of each training run
+    window: int  # snapshots that a closure follows at a time
+    late: float  # from when on lift is a sine, of the run
+    folder: str  # of the runs
+    runs: dict[str, float]  # options of `WakeRuns`
+
+
+STARTS = {
+    "developed": Start(18.0, 50, 0.5, "", {}),
+    "steady": Start(
+        75.0, 100, 2.0 / 3.0, "from-steady", {"first": 40.0, "developed": 40.0, "adapted": 0.0}
+    ),
+}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -52,14 +72,16 @@ def _arguments(add) -> None:
         help="default: 80 110 140")  # fmt: skip
     add("--modes", type=positive_int, nargs="+", default=[8, 14, 20], metavar="M",
         help="default: 8 14 20")  # fmt: skip
-    add("--recorded", type=positive_float, default=18.0, metavar="S",
-        help="of flow in each training run [s] (default: 18)")  # fmt: skip
+    add("--start", choices=tuple(STARTS), default="developed",
+        help="the wake that sheds, or the steady one of Re = 40 (default: developed)")  # fmt: skip
+    add("--recorded", type=positive_float, metavar="S",
+        help="of flow in each training run [s] (default: 18 developed, 75 steady)")  # fmt: skip
     add("--unseen", type=positive_float, nargs="+", default=list(UNSEEN), metavar="RE",
         help="default: 95 125")  # fmt: skip
     add("--seconds", type=positive_float, metavar="S",
         help="of an unseen flow that are followed (default: 18 at 95, else 60)")  # fmt: skip
     add("--twice", action="store_true",
-        help="a second full run beside each, of particles moved by 0.001 dx")  # fmt: skip
+        help="a second full run beside each new row, of particles moved by 0.001 dx")  # fmt: skip
     add("--closure", choices=("none", "linear"), default="none", help="default: none")
     add("--out", type=Path, default=Path("out/wake"), metavar="DIR",
         help="where runs are kept (default: %(default)s)")  # fmt: skip
@@ -68,7 +90,9 @@ def _arguments(add) -> None:
 def _run(options) -> bool:
     kept = Table(options.json, KEY, beside=lambda rows: {"environment": environment()})
     trained_on = "-".join(f"{r:g}" for r in options.train)
-    shared = (options.resolution, trained_on, options.recorded)
+    start = STARTS[options.start]
+    recorded = options.recorded or start.recorded
+    shared = (options.resolution, options.start, trained_on, recorded)
     unseen = [(re, options.seconds or UNSEEN.get(re, 60.0)) for re in options.unseen]
     cases = [
         dict(zip(KEY, (*shared, modes, options.closure, *each), strict=True))
@@ -77,7 +101,8 @@ def _run(options) -> bool:
     ]
     left = list(kept.left(cases))
     if left:
-        runs = WakeRuns(options.out, options.resolution, recorded=options.recorded)
+        folder = options.out / start.folder
+        runs = WakeRuns(folder, options.resolution, recorded=recorded, **start.runs)
         models = _models(runs, options, sorted({case["modes"] for case in left}))
         for modes, (model, drag) in models:
             for case in (case for case in left if case["modes"] == modes):
@@ -93,7 +118,8 @@ def _models(runs: WakeRuns, options, sizes):
         known = trained.get(float(reynolds))
         return runs.scene(reynolds, runs.recorded) if known is None else known[0]
 
-    closure = jaxsph_rom.LinearClosure() if options.closure == "linear" else None
+    learnt = jaxsph_rom.LinearClosure(window=STARTS[options.start].window)
+    closure = learnt if options.closure == "linear" else None
     points = [{"reynolds": reynolds} for reynolds in options.train]
     full = [run for _, run in trained.values()]
     models = train_each(
@@ -121,10 +147,13 @@ def judge(model, forces, runs: WakeRuns, case: dict[str, Any], twice: bool) -> d
     mine = 2.0 * np.asarray(forces(jnp.asarray(reduced.coordinates[0]), values))
     mine /= SPEED**2 * DIAMETER
     mine[1:] = 0.5 * (mine[1:] + mine[:-1])  # means between snapshots, as theirs are
-    late = full.time > 0.5 * full.time[-1]
+    late = full.time > STARTS[case["start"]].late * full.time[-1]
 
     def wave_of(each):
-        return harmonic(full.time[late], *each[late].T)
+        found = harmonic(full.time[late], *each[late].T)
+        if case["start"] == "steady":
+            found["onset"] = onset(full.time[1:], each[1:, 1])
+        return found
 
     true = wave_of(_coefficients(full))
     flow = model.flow
@@ -143,7 +172,7 @@ def judge(model, forces, runs: WakeRuns, case: dict[str, Any], twice: bool) -> d
     timed = model.predict({"reynolds": reynolds}, start=scene, times=full.time)
     again = wave_of(_coefficients(runs.run(reynolds, seconds, True)[1])) if twice else None
     return row | {
-        **{f"{name}_full": true[name] for name in COMPARED},
+        **{f"{name}_full": true[name] for name in (*COMPARED, "onset") if name in true},
         **beside(wave_of(mine), true),
         "full_again": None if again is None else beside(again, true),
         "periods": true["strouhal"] * seconds,
@@ -164,7 +193,7 @@ def beside(wave: dict[str, float], true: dict[str, float]) -> dict[str, float]:
     apart = (wave["phase"] - true["phase"]) / (2.0 * np.pi)
     off = {name: 100.0 * abs(wave[name] / true[name] - 1.0) for name in COMPARED}
     return {
-        **{name: wave[name] for name in COMPARED},
+        **{name: wave[name] for name in (*COMPARED, "onset") if name in wave},
         **{f"{name.removesuffix('_amplitude')}_error_percent": off[name] for name in COMPARED},
         "phase_error_percent_of_a_period": 100.0 * abs((apart + 0.5) % 1.0 - 0.5),
     }

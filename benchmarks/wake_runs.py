@@ -16,6 +16,7 @@ from jaxsph_rom.study import with_record
 
 DOMAIN = {"width": 6.0, "upstream": 4.0, "downstream": 6.0}  # m
 _NUDGE = 1e-3  # dx
+_STRENGTH = 5.0  # s, about a period
 STEP, EACH = 1.5e-2, 20  # s, steps to a snapshot, for 10 particles a diameter
 
 
@@ -27,7 +28,8 @@ class WakeRuns:
         resolution: particles a diameter.
         first: Reynolds number of the run from the start.
         developed: how long that takes to shed regularly [s].
-        adapted: how long a run at another number takes until it is recorded [s].
+        adapted: how long a run at another number takes until it is recorded [s]; 0 for one that is
+            recorded from the end of the first on.
         recorded: and how long it is then [s].
     """
 
@@ -65,23 +67,38 @@ class WakeRuns:
     ) -> tuple[Scene, Trajectory]:
         """The scene of what is recorded, and its run; from particles all of them a thousandth of a
         spacing elsewhere, if it is nudged."""
-        start, developed = self._from_start()
-        adapting = self.after(
-            start, developed.state(-1), self.scene(reynolds, self.adapted), "developed"
-        )
-        adapted = self._kept(f"adapt-{reynolds:g}", adapting)
+        before, run = self._from_start()
+        how = "steady"
+        if self.adapted:
+            adapting = self.scene(reynolds, self.adapted)
+            before = self.after(before, run.state(-1), adapting, "developed")
+            run, how = self._kept(f"adapt-{reynolds:g}", before), "adapted"
         seconds = self.recorded if recorded is None else recorded
-        state, how, name = adapted.state(-1), "adapted", f"record-{reynolds:g}-{seconds:g}s"
+        state, name = run.state(-1), f"record-{reynolds:g}-{seconds:g}s"
         if nudged:
             away = np.random.default_rng(0).normal(scale=_NUDGE, size=state.position.shape)
-            away = (away * adapting.space.spacing).astype(state.position.dtype)
+            away = (away * before.space.spacing).astype(state.position.dtype)
             state = dataclasses.replace(state, position=state.position + away)
             how, name = f"{how}-nudged", f"{name}-nudged"
-        scene = self.after(adapting, state, self.scene(reynolds, seconds), how)
+        scene = self.after(before, state, self.scene(reynolds, seconds), how)
         return scene, self._kept(name, scene)
 
     def _kept(self, name: str, scene: Scene) -> Trajectory:
         return run_scene(scene, path=self.folder / f"{name}.h5", progress=True)
+
+
+def onset(time, lift) -> float | None:
+    """When lift, as strong as it is within five seconds, has come to half of its strength in the
+    last quarter, for good [s]; None if it is weaker at the end."""
+    count = max(2, round(_STRENGTH / (time[1] - time[0])))
+    swing = lift - np.mean(lift[-len(lift) // 4 :])
+    strength = np.sqrt(np.convolve(swing**2, np.full(count, 1.0 / count), mode="valid"))
+    middle = time[: len(strength)] + 0.5 * (count - 1) * (time[1] - time[0])
+    late = strength[middle > 0.75 * time[-1]].mean()
+    weak = np.flatnonzero(strength < 0.5 * late)
+    if not len(weak):
+        return 0.0
+    return None if weak[-1] + 1 == len(strength) else float(middle[weak[-1] + 1])
 
 
 def harmonic(time, drag, lift) -> dict[str, float]:

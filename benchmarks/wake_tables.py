@@ -18,7 +18,7 @@ def cylinder_wake() -> str:
             f"{row['upstream']:g}",
             short(row["drag"], 3),
             *(
-                short(row[name], 3) if name in row else ""
+                "" if row.get(name) is None else short(row[name], 3)
                 for name in ("lift_amplitude", "strouhal", "wake_length")
             ),
             str(row["steps"]),
@@ -60,35 +60,94 @@ def drag_slopes() -> str:
 
 
 def wake_models() -> str:
-    """Reduced models at Reynolds numbers that they have not seen."""
-    header = ("M", "closure", "Re", "periods", "Strouhal off by %", "drag %", "lift %",
-              "phase at the end, % of a period", "velocity %", "floor %", "full, reduced [s]",
-              "times faster")  # fmt: skip
-    names = ("strouhal_error_percent", "drag_error_percent", "lift_error_percent",
-             "phase_error_percent_of_a_period", "velocity_error_percent")  # fmt: skip
-    rows = [
-        (
+    """Reduced models of the developed wake, at Reynolds numbers that they have not seen."""
+    header = ("M", "closure", "trained on [s]", "Re", "periods", "Strouhal off by %", "drag %",
+              "lift %", "phase at the end, % of a period", "velocity %", "floor %",
+              "full, reduced [s]", "times faster")  # fmt: skip
+
+    def line(row) -> tuple[str, ...]:
+        return (
             str(row["modes"]),
             row["closure"],
+            f"{row['recorded']:g}",
             short(row["reynolds"], 3),
             *(
                 (row["fault"], *[""] * 8)
                 if row["fault"]
                 else (
                     short(row["periods"]),
-                    *(short(row[name]) for name in names),
+                    *(short(row[name]) for name in _WAVE),
+                    short(row["velocity_error_percent"]),
                     short(row["velocity_floor_percent"]),
                     f"{row['full_seconds']:.0f}, {short(row['reduced_seconds'])}",
                     f"{row['times_faster']:.0f}",
                 )
             ),
         )
-        for row in sorted(
-            results("wake_models"),
-            key=lambda row: (row["closure"] != "none", row["modes"], row["reynolds"]),
+
+    rows = _wakes("developed")
+    again = [
+        ("full model, again", "", "", short(row["reynolds"], 3), short(row["periods"]),
+         *(short(row["full_again"][name]) for name in _WAVE), "", "", "", "")
+        for row in _run_twice(rows)
+    ]  # fmt: skip
+    return markdown(header, [*map(line, rows), *again])
+
+
+_WAVE = ("strouhal_error_percent", "drag_error_percent", "lift_error_percent",
+         "phase_error_percent_of_a_period")  # fmt: skip
+
+
+def _wakes(start: str):
+    rows = (row for row in results("wake_models") if row["start"] == start)
+    names = ("recorded", "modes", "reynolds", "seconds_of_flow")
+    return sorted(
+        rows, key=lambda row: (row["closure"] != "none", *(row[name] for name in names))
+    )
+
+
+def _run_twice(rows):
+    """One row of each flow of which the full model was run twice."""
+    found = {(r["reynolds"], r["seconds_of_flow"]): r for r in rows if r.get("full_again")}
+    return found.values()
+
+
+def _seconds(value: float | None) -> str:
+    return "never" if value is None else f"{value:.0f}"
+
+
+def wake_transients() -> str:
+    """Reduced models of a wake that begins to shed, at numbers that they have not seen."""
+    header = ("M", "closure", "Re", "sheds from, full / here [s]", "Strouhal off by %", "drag %",
+              "lift %", "phase at the end, % of a period", "velocity %", "floor %",
+              "times faster")  # fmt: skip
+    rows = _wakes("steady")
+
+    def line(row) -> tuple[str, ...]:
+        return (
+            str(row["modes"]),
+            row["closure"],
+            short(row["reynolds"], 3),
+            *(
+                (row["fault"], *[""] * 7)
+                if row["fault"]
+                else (
+                    f"{row['onset_full']:.0f} / {_seconds(row['onset'])}",
+                    *(short(row[name]) for name in _WAVE),
+                    short(row["velocity_error_percent"]),
+                    short(row["velocity_floor_percent"]),
+                    f"{row['times_faster']:.0f}",
+                )
+            ),
         )
-    ]
-    return markdown(header, rows)
+
+    again = [
+        ("full model, again", "", short(row["reynolds"], 3),
+         f"{row['onset_full']:.0f} / {row['full_again']['onset']:.0f}",
+         *(short(row["full_again"][name]) for name in _WAVE), "", "", "")
+        for row in _run_twice(rows)
+    ]  # fmt: skip
+    return markdown(header, [*map(line, rows), *again])
 
 
 def open_flux() -> str:

@@ -80,9 +80,13 @@ def kept_run(
             metadata=metadata,
             **options,
         )
-        devices.by_first(lambda: writer.finish(part.metadata))
-    devices.meet()  # the file is closed
+        devices.by_first(lambda: _ended(writer, part.metadata))
     return _whole(path, scene)
+
+
+def _ended(writer: TrajectoryWriter, metadata: dict) -> None:
+    writer.finish(metadata)
+    writer.close()
 
 
 def _gone_on_with(path: Path, begun: Trajectory) -> TrajectoryWriter:

@@ -178,7 +178,7 @@ OPEN = (
          partial(_filling, 1.6, 4), endings=(Ending.FAULT,), says="park more of them",
          codes=(FaultCode.NONE_PARKED,)),
     Case("open/all-parked", "a tank with no water in it, nor behind its port, all of it parked",
-         _nothing, endings=(Ending.REFUSED,), says="no particle starts in the reserve"),
+         _nothing, endings=(Ending.REFUSED,), says="no particle is in the buffer of the inlet"),
     Case("open/buffers-vortex-leaves", "16 across, Re = 1000, a vortex leaves through an opening",
          partial(_vortex_leaves, 3.0, "openings"), LEAVING, slow=True),
     Case("open/tank-drains", "the tank's inflow turned round: it drains to the port's top, 6 s",

@@ -86,7 +86,7 @@ _STORED = {
         "channel_cylinder", "channel_cylinder", "drag beside the middle of the literature's [%]",
         lambda row: True,
         lambda row: 100.0 * abs(row["drag"] / _drag_of_the_literature() - 1.0),
-        series=lambda row: f"h = {row['h_over_dx']:g} dx, {row['ends']}",
+        series=lambda row: f"h = {row['h_over_dx']:g} dx, {row['ends']}, ghosts: {row['ghosts']}",
     ),
 }  # fmt: skip
 

@@ -126,10 +126,10 @@ class Opening(eqx.Module):
         """Which particles have gone out at the end of the buffer."""
         return (self.depth(position) > self.length) & self.spans(position)
 
-    def in_reserve(self, position) -> Bool[Array, " particles"]:
-        """Which particles are in the reserve."""
+    def in_buffer(self, position) -> Bool[Array, " particles"]:
+        """Which particles are behind the mouth."""
         depth = self.depth(position)
-        return (depth > self.before_reserve) & (depth <= self.length) & self.spans(position)
+        return (depth > 0.0) & (depth <= self.length) & self.spans(position)
 
     def behind(self, position: Float[Array, "particles dim"]) -> Float[Array, "particles dim"]:
         """Places a reserve's length further out [m]."""
@@ -242,11 +242,11 @@ class Openings(Effect):
                     f"support of {space.support:.3g} m; particles that come out of it would miss "
                     "some of their neighbours. Take half as much again as that."
                 )
-            if not opening.in_reserve(position).any():
+            if opening.velocity is not None and not opening.in_buffer(position).any():
                 low, up = (", ".join(f"{x:g}" for x in c) for c in (opening.lower, opening.upper))
                 raise ValueError(
-                    f"opening: no particle starts in the reserve of the one from ({low}) m to "
-                    f"({up}) m, and as many as start there come in again and again; fill it."
+                    f"opening: no particle is in the buffer of the inlet from ({low}) m to ({up}) "
+                    "m, and as many as start in its reserve come in again and again; fill it."
                 )
         return math.inf
 

@@ -6,7 +6,7 @@ from ..arrangements import Arrangement
 from ..kernels import Kernel
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, WallPart
-from .composed import pick_scale, positive
+from .composed import in_rows, pick_scale, positive
 from .ends import named_ends
 from .open_channel import open_channel
 from .scales import Scale
@@ -28,6 +28,7 @@ def channel_cylinder(
     reynolds: float = 20.0,
     *,
     ends: str = "fringe",
+    ghosts: str = "rows",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -50,6 +51,7 @@ def channel_cylinder(
         resolution: particles across; overrides the scale's, time step scaled along.
         reynolds: Reynolds number of mean speed and diameter.
         ends: `fringe` or `openings`; what lies beyond the channel.
+        ghosts: in `rows` along the cylinder, or on the `lattice`, which makes stairs of it.
         scale: `small` (41 across), `half` (82) or `paper` (164).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -72,6 +74,7 @@ def channel_cylinder(
         height=HEIGHT,
         mean_speed=MEAN,
         obstacle=CYLINDER,
+        in_rows=in_rows(ghosts, [CYLINDER]),
         parts=[WallPart("cylinder", CYLINDER, reference_length=DIAMETER, reference_speed=MEAN)],
         scale=pick_scale(SCALES, scale).with_overrides(end_time, resolution, h_over_dx, time_step),
         end_time=end_time,
@@ -82,5 +85,5 @@ def channel_cylinder(
         kernel=kernel,
         scheme=SharpAtWalls() if scheme is None else scheme,
         dtype=dtype,
-        parameters={"ends": ends, "scale": scale, "reynolds": reynolds},
+        parameters={"ends": ends, "ghosts": ghosts, "scale": scale, "reynolds": reynolds},
     )

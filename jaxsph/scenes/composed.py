@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -23,6 +23,7 @@ from .scales import Scale
 from .scene import Scene
 from .solution import ExactFlow
 
+GHOSTS = ("rows", "lattice")  # how those of a curved wall may stand
 _CLEAR = 0.2  # times dx: between particles and walls at the start, outside of `WallRepulsion`
 
 
@@ -128,6 +129,13 @@ def composed(
         walls=around,
         solution=solution,
     )
+
+
+def in_rows(ghosts: str, parts: Sequence[Region]) -> tuple[Region, ...]:
+    """Parts of the walls whose ghosts are in rows along them, as a scene's `ghosts` says."""
+    if ghosts not in GHOSTS:
+        raise ValueError(f"ghosts: one of {', '.join(GHOSTS)}, got {ghosts!r}.")
+    return tuple(parts) if ghosts == "rows" else ()
 
 
 def pick_scale(scales: dict[str, Scale], scale: str) -> Scale:

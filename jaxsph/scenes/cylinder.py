@@ -10,7 +10,7 @@ from ..effects import UniformProfile
 from ..kernels import Kernel
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, WallPart
-from .composed import pick_scale, positive
+from .composed import in_rows, pick_scale, positive
 from .ends import named_ends
 from .flow_through import flow_through
 from .scales import Scale
@@ -34,6 +34,7 @@ def cylinder(
     downstream: float = 10.0,
     width: float = 10.0,
     ends: str = "fringe",
+    ghosts: str = "lattice",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -62,6 +63,8 @@ def cylinder(
         downstream: from there to the outflow [m].
         width: of the box across the stream [m].
         ends: `fringe` or `openings`; what lies beyond the channel.
+        ghosts: in `rows` along the cylinder, or on the `lattice`, which makes stairs of it; these
+            are symmetric, as the cylinder's centre is a corner of lattice cells.
         scale: `small` (10 a diameter), `half` (20) or `paper` (30).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -101,6 +104,7 @@ def cylinder(
         speed=SPEED,
         inflow=UniformProfile(jnp.asarray(SPEED)),
         start=start,
+        in_rows=in_rows(ghosts, [body]),
         parts=[WallPart("cylinder", body, reference_length=DIAMETER, reference_speed=SPEED)],
         scale=scale_of,
         end_time=end_time,
@@ -113,6 +117,7 @@ def cylinder(
         dtype=dtype,
         parameters={
             "ends": ends,
+            "ghosts": ghosts,
             "scale": scale,
             "reynolds": reynolds,
             "upstream": upstream,

@@ -34,6 +34,7 @@ def enclosed_flow(
     moving: Sequence[MovingWall] = (),
     parts: Sequence[WallPart] = (),
     opening: Region | None = None,
+    in_rows: Sequence[Region] = (),
     force: BodyForce | None = None,
     wall_velocity: Effect | None = None,
     pressure: Callable | None = None,
@@ -61,6 +62,7 @@ def enclosed_flow(
         moving: parts of the walls that slide along themselves.
         parts: of the walls, whose forces are recorded by name.
         opening: where the fluid may reach past the box's faces.
+        in_rows: parts of the walls whose ghosts are in rows along them.
         force: body force, if there is one.
         wall_velocity: how viscosity sees the walls; the scheme's own no-slip if none is given.
         pressure: positions (N, n) [m] -> pressure at the start (N,) [Pa]; zero if none is given.
@@ -89,7 +91,7 @@ def enclosed_flow(
         side=side,
         region=fluid_region,
         walls=lambda space: Walls.around(
-            fluid_region, space, moving, layers, parts=parts, opening=opening
+            fluid_region, space, moving, layers, parts=parts, opening=opening, in_rows=in_rows
         ),
         pressure=pressure,
         arrangement=Lattice() if arrangement is None else arrangement,

@@ -32,6 +32,7 @@ def open_channel(
     start: Callable | None = None,
     obstacle: Region | None = None,
     parts: Sequence[WallPart] = (),
+    in_rows: Sequence[Region] = (),
     solution: ExactFlow | None = None,
     scale: Scale,
     end_time: float,
@@ -59,6 +60,7 @@ def open_channel(
             everywhere if none is given.
         obstacle: in the channel, if there is one.
         parts: of the walls, whose forces are recorded by name.
+        in_rows: those whose ghosts are in rows along them.
         solution: the exact flow, if it is known.
         scale, end_time, viscosity, mach, layers, arrangement, kernel, scheme, dtype, parameters: as
             those of `enclosed_flow`.
@@ -80,6 +82,7 @@ def open_channel(
         start=start,
         solution=solution,
         parts=parts,
+        in_rows=in_rows,
         scale=scale,
         end_time=end_time,
         viscosity=viscosity,

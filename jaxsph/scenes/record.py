@@ -20,6 +20,8 @@ _RULES = {
     "wall_velocity": (Effect, effects),
     "arrangement": (Arrangement, arrangements),
 }
+# what records lack that are from before there was a choice
+_BEFORE = {"scheme": DeltaPlus.__name__, "ghosts": "lattice"}
 
 
 def scene_from_record(
@@ -47,9 +49,8 @@ def scene_from_record(
             f"parameters: scene {name} has no {', '.join(unknown)}; the record may come from "
             "another version."
         )
-    options = dict(parameters)
-    if "scheme" in inspect.signature(make).parameters:  # records from before there were any lack it
-        options.setdefault("scheme", DeltaPlus.__name__)
+    before = {k: v for k, v in _BEFORE.items() if k in inspect.signature(make).parameters}
+    options = {**before, **parameters}
     if arrangement is not None:
         options["arrangement"] = arrangement
     return dataclasses.replace(make(**rules_restored(options)), parameters=parameters)

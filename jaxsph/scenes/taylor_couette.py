@@ -16,7 +16,7 @@ from ..kernels import Kernel
 from ..record import record
 from ..schemes import Scheme, SharpAtWalls
 from ..walls import BallRegion, MovingWall, WallPart, Walls
-from .composed import composed, pick_scale, positive
+from .composed import composed, in_rows, pick_scale, positive
 from .scales import Scale
 from .scene import Scene
 
@@ -95,6 +95,7 @@ def taylor_couette(
     *,
     inner: float = 1.0,
     outer: float = 0.0,
+    ghosts: str = "rows",
     scale: str = "small",
     h_over_dx: float | None = None,
     time_step: float | None = None,
@@ -117,6 +118,7 @@ def taylor_couette(
         resolution: particles to the inner radius; overrides the scale's, time step scaled along.
         reynolds: Reynolds number.
         inner, outer: turns of the cylinders [rad/s], counterclockwise; one at least is not zero.
+        ghosts: in `rows` along the cylinders, or on the `lattice`, which makes stairs of them.
         scale: `small` (12 to the radius), `half` (24) or `paper` (48).
         h_over_dx: smoothing length over spacing; overrides the scale's.
         time_step: dt [s]; overrides the scale's.
@@ -164,7 +166,10 @@ def taylor_couette(
         mach=mach,
         side=INNER,
         region=region,
-        walls=lambda space: Walls.around(region, space, turning, layers, parts=parts),
+        walls=lambda space: Walls.around(
+            region, space, turning, layers, parts=parts,
+            in_rows=in_rows(ghosts, [part.region for part in parts]),
+        ),
         velocity=lambda x: flow(x, 0.0)[0],
         pressure=lambda x: flow(x, 0.0)[1],
         arrangement=Lattice() if arrangement is None else arrangement,
@@ -176,6 +181,7 @@ def taylor_couette(
             "reynolds": reynolds,
             "inner": inner,
             "outer": outer,
+            "ghosts": ghosts,
             "layers": layers,
             "wall_velocity": None if wall_velocity is None else record(wall_velocity),
             "scheme": record(scheme),

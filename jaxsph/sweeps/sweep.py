@@ -96,14 +96,17 @@ def _fill(path, members: Members, first: Scene, count: int, batch: int, every, p
                 if status[0] == FaultCode.NEIGHBOR_OVERFLOW and attempt < _ENLARGEMENTS:
                     clumped.append(number)
                     continue
-                every.by_first(partial(sweep_file.store, path, number, snapshots, status))
-                if every.write_here:
-                    _warn_of_clumps(first, number, snapshots, int(status[3]))
+                every.by_first(partial(_keep, path, first, number, snapshots, status))
                 if progress is not None:
                     progress(1)
         if not clumped:
             break
         left, members = np.asarray(clumped), members.enlarged()
+
+
+def _keep(path, first: Scene, number: int, snapshots: Snapshot, status) -> None:
+    sweep_file.store(path, number, snapshots, status)
+    _warn_of_clumps(first, number, snapshots, int(status[3]))
 
 
 def _warn_of_clumps(scene: Scene, number: int, snapshots: Snapshot, good: int) -> None:
@@ -113,7 +116,7 @@ def _warn_of_clumps(scene: Scene, number: int, snapshots: Snapshot, good: int) -
     last = jax.tree.map(lambda a: np.asarray(a[good - 1]), snapshots)
     why = Clumping(scene.space)(scene.schedule.interval * (good - 1), last)
     if why is not None:
-        warnings.warn(f"member {number}: {why}.", stacklevel=4)
+        warnings.warn(f"member {number}: {why}.", stacklevel=6)
 
 
 class _Run(NamedTuple):

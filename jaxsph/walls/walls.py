@@ -28,6 +28,7 @@ from .refusals import (
     refuse_torn_walls,
 )
 from .region import Region
+from .rows import rows_along
 
 _POINTS = 4096  # at which a distance is evaluated at a time
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
@@ -79,8 +80,10 @@ class Walls(eqx.Module):
         parts: Sequence[WallPart] = (),
         free_bodies: Sequence[FreeBody] = (),
         opening: Region | None = None,
+        in_rows: Sequence[Region] = (),
     ) -> Walls:
-        """Ghosts on the lattice of `space`, continued into the walls around a region of fluid.
+        """Ghosts on the lattice of `space`, continued into the walls around a region of fluid, some
+        of them in rows along a surface.
 
         Args:
             fluid_region: where fluid may be; everything else in and around the box is wall.
@@ -94,11 +97,13 @@ class Walls(eqx.Module):
             free_bodies: that the fluid moves, in two dimensions; as far from fixed walls as above.
             opening: where the fluid may reach past the box's faces, through the buffers of
                 `jaxsph.effects.Openings`.
+            in_rows: parts of the fixed walls, in two dimensions, whose ghosts are in rows along
+                their surface; for curved ones away from others, of which the lattice makes stairs.
 
         Raises:
             ValueError: for a gap in the walls, a wall too thin, a moving part without a wall or
                 that does not move along it, a body without room in the region or too thin, or a
-                named part without a ghost.
+                named part without a ghost; for rows in three dimensions, or where no fixed wall is.
 
         Examples:
             >>> import jax.numpy as jnp
@@ -122,6 +127,8 @@ class Walls(eqx.Module):
         depth = distance(lattice)
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
+        if in_rows:
+            ghosts = _put_in_rows(ghosts, fluid_region, in_rows, space, layers)
         beside = lattice[(depth < 0.0) & (depth > -space.spacing)]
         refuse_seams(distance, space, beside, _in_blocks(_gradient, fluid_region, beside))
         moved = (*bodies, *free_bodies)
@@ -276,6 +283,17 @@ def _check_parts(parts: Sequence[WallPart], ghosts: np.ndarray, spacing: float) 
                 f"part {part.name}: no ghost lies in {part.region}; let it cover some of the wall, "
                 "several spacings thick, beyond the fluid."
             )
+
+
+def _put_in_rows(ghosts, fluid_region: Region, parts: Sequence[Region], space: Space, layers: int):
+    """The ghosts of some parts of the walls in rows, the others where they are."""
+    distance = partial(_in_blocks, _distance, fluid_region)
+    rows = rows_along(distance, partial(_in_blocks, _gradient, fluid_region), space, layers)
+    on_lattice, standing = (ghosts_in(parts, places, space.spacing) for places in (ghosts, rows))
+    for part, own in zip(parts, standing, strict=True):
+        if not own.any():
+            raise ValueError(f"in_rows: no fixed wall lies in {part}; name parts of these alone.")
+    return np.concatenate([ghosts[~np.any(on_lattice, axis=0)], rows[np.any(standing, axis=0)]])
 
 
 def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:

@@ -53,9 +53,8 @@ def slopes(function, points, spacing=2e-3):
     ]
 
 
-@pytest.mark.parametrize(
-    "reynolds", [pytest.param(re, marks=pytest.mark.slow) for re in (100, 400)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("reynolds", [100, 400])
 def test_regularised_lid_converges(reynolds):
     coarse, middle, fine = (cavity(reynolds, regularised_lid, n) for n in (24, 32, 40))
     first = np.max(np.abs(middle.velocity(GRID) - coarse.velocity(GRID)))

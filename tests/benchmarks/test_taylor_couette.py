@@ -14,7 +14,7 @@ ROWS = Path(benchmark.__file__).parent / "results" / "taylor_couette.json"
 
 @pytest.mark.parametrize("turns", ["inner", "outer"])
 def test_it_starts_from_the_exact_flow(turns):
-    case = {"scheme": "sharp-at-walls", "turns": turns, "resolution": 8, "h_over_dx": 2.0}
+    case = dict(zip(benchmark.KEY, ("sharp-at-walls", "rows", turns, 8, 2.0), strict=True))
     scene, flow = benchmark.annulus(case)
     a, b = flow.coefficients
     for name, radius in (("inner", benchmark.INNER), ("outer", benchmark.OUTER)):
@@ -29,11 +29,14 @@ def test_it_starts_from_the_exact_flow(turns):
 
 
 def test_stored_torques_converge():
-    rows = {(r["turns"], r["resolution"]): r for r in json.loads(ROWS.read_text())["rows"]}
+    rows = {
+        (r["ghosts"], r["turns"], r["resolution"]): r for r in json.loads(ROWS.read_text())["rows"]
+    }
     for turns in ("inner", "outer"):
         for wall in ("inner", "outer"):
             name = f"{wall}_torque_error_percent"
-            assert abs(rows[turns, 16][name]) < abs(rows[turns, 8][name])
+            assert abs(rows["lattice", turns, 16][name]) < abs(rows["lattice", turns, 8][name])
+            assert max(abs(rows["rows", turns, n][name]) for n in (8, 12, 16)) < 1.5
 
 
 def test_bad_input_is_refused():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import cylinder_wake, drag_slopes
-from benchmarks.wake_runs import harmonic
+from benchmarks.wake_models import beside
+from benchmarks.wake_runs import harmonic, onset
 
 
 def test_lift_is_taken_for_the_sine_that_it_is():
@@ -21,6 +22,27 @@ def test_lift_is_taken_for_the_sine_that_it_is():
     assert found["lift_left_rms"] == pytest.approx(0.05, rel=0.2)
     turned = (found["phase"] - angle[-1] + np.pi) % (2.0 * np.pi) - np.pi
     assert abs(turned) < 0.1
+
+
+def test_a_wake_sheds_from_when_lift_is_half_as_strong_as_at_last():
+    time = np.arange(0.3, 75.0, 0.3)
+    angle = 2.0 * np.pi * 0.173 * time
+    noise = 0.02 * np.random.default_rng(0).normal(size=len(time))
+    lift = 0.3 / (1.0 + np.exp(-(time - 30.0) / 2.0)) * np.sin(angle) + noise
+    assert onset(time, lift) == pytest.approx(30.0, abs=1.0)
+    assert onset(time, 0.3 * np.sin(angle)) == 0.0
+    assert onset(time, 0.3 * np.exp(-((time / 70.0) ** 20)) * np.sin(angle)) is None  # it has died
+
+
+def test_a_wake_beside_another_is_off_by_shares_and_by_a_part_of_a_period():
+    true = {"strouhal": 0.2, "drag": 1.5, "lift_amplitude": 0.3, "phase": 0.1}
+    wave = {"strouhal": 0.201, "drag": 1.47, "lift_amplitude": 0.33, "phase": 0.1 - 0.2 * np.pi}
+    found = beside(wave, true)
+    assert found["strouhal_error_percent"] == pytest.approx(0.5)
+    assert found["drag_error_percent"] == pytest.approx(2.0)
+    assert found["lift_error_percent"] == pytest.approx(10.0)
+    assert found["phase_error_percent_of_a_period"] == pytest.approx(10.0)
+    assert "onset" not in found
 
 
 @pytest.mark.slow

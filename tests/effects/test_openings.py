@@ -347,6 +347,22 @@ def test_bad_openings_are_refused(make, message):
         make()
 
 
+def test_an_inlet_has_particles_to_let_in_and_an_outlet_may_be_dry(plug):
+    """A start with the buffer of one of two openings empty."""
+    scene, _ = plug
+    effect = openings_of(scene)
+    of_inlet, of_outlet = (o.in_buffer(scene.state.position)[:, None] for o in effect.openings)
+    assert effect.openings[0].velocity is not None and of_inlet.any() and of_outlet.any()
+
+    def without(there):
+        position = jnp.where(there, jnp.asarray(scene.parking.place), scene.state.position)
+        return effect.step_limit_from(position, scene.fluid, scene.space)
+
+    assert without(of_outlet) == np.inf
+    with pytest.raises(ValueError, match="no particle is in the buffer of the inlet"):
+        without(of_inlet)
+
+
 def test_scenes_without_openings_know_nothing_of_them():
     scene = poiseuille_open(12, end_time=0.1)
     assert scene.parking is None
