@@ -171,7 +171,7 @@ OPEN = (
     Case("open/buffers-inflow-stops", "through openings, the inflow stops within 0.5 s, 3 s",
          partial(_channel, _stops, 3.0, "float64", "openings"), STOPPED),
     Case("open/buffers-back-flow", "through openings, the inflow swings: half of the time out",
-         partial(_channel, _swings, 3.0, "float64", "openings"), THROUGH),
+         partial(_channel, _swings, 3.0, "float64", "openings"), THROUGH, slow=True),
     Case("open/buffers-float32", "the same in single precision",
          partial(_channel, _swings, 3.0, "float32", "openings"), THROUGH, precision="float32"),
     Case("open/none-parked", "a tank that fills, four particles parked and more coming in",

@@ -13,7 +13,7 @@ from jaxsph.arrangements import Lattice
 from jaxsph.cli.recorded import _errors
 from jaxsph.effects import FreeSlip, Opening, Openings, UniformProfile
 from jaxsph.history import read_history
-from jaxsph.integrate import FaultCode
+from jaxsph.integrate import FaultCode, integrate
 from jaxsph.io import read_snapshot, read_trajectory, snapshot_blocks
 from jaxsph.parking import Parking, flowing
 from jaxsph.scenes import OpenEnds, Scale, composed, continued, flow_through, poiseuille_open
@@ -294,8 +294,6 @@ def test_derivatives_are_those_of_the_flow():
     model, schedule = scene.model(), scene.schedule
     number = [isinstance(e, Openings) for e in scene.effects].index(True)
     within = jnp.abs(scene.state.position[:, 0] - 1.0) < 0.5
-
-    from jaxsph.integrate import integrate
 
     def mean(peak):
         ends = scene.effects[number]

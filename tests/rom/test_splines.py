@@ -35,6 +35,7 @@ def test_exact_at_the_nodes(order):
     np.testing.assert_allclose(found, waves(points), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.run_once
 def test_exact_at_the_nodes_in_three_dimensions():
     space, points = setting(side=12, dim=3)

@@ -11,6 +11,7 @@ from jaxsph.scenes.record import scene_from_record
 NARROW = {"upstream": 1.5, "downstream": 2.0, "width": 2.0}
 
 
+@pytest.mark.slow
 def test_a_stream_pulls_at_a_cylinder_and_comes_round_as_it_was():
     scene = cylinder(8, 50.0, end_time=0.3, h_over_dx=1.3, **NARROW)
     trajectory = run_scene(scene)

@@ -37,7 +37,13 @@ class ToAndFro(eqx.Module):
         return jnp.zeros_like(position).at[:, 0].set(peak * swing)
 
 
-@pytest.fixture(scope="module", params=[FringeEnds(1.0), OpenEnds()], ids=["fringe", "openings"])
+ENDS = [
+    pytest.param(FringeEnds(1.0), id="fringe", marks=pytest.mark.slow),
+    pytest.param(OpenEnds(), id="openings"),
+]
+
+
+@pytest.fixture(scope="module", params=ENDS)
 def scene(request):
     return open_channel(
         "to-and-fro",

@@ -109,7 +109,11 @@ def test_what_the_paper_s_scheme_has_there():
     assert growth(vessel(8, jitter=0.0, scheme=DeltaPlus())) > 1e-2  # corners
 
 
-@pytest.mark.parametrize("options", [dict(side=10), dict(side=12, periodic=True)], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [pytest.param(dict(side=10), marks=pytest.mark.slow), dict(side=12, periodic=True)],
+    ids=str,
+)
 def test_disordered_particles_at_rest_stay_there(options):
     run = run_scene(vessel(viscosity=1e-6, end_time=20.0, **options))
     assert not np.any(run.velocity)
@@ -136,7 +140,7 @@ def test_a_kick_s_energy_is_never_above_its_start(options):
     assert np.all(energy[5:] < 0.9 * energy[0])  # sound has gone
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_water_in_its_own_balance_stays_there(dim):
     """p of the fluid at rest under gravity, however disordered: no acceleration at all."""
     pull = jnp.zeros(dim).at[dim - 1].set(-1.0).at[0].set(0.3)

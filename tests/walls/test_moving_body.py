@@ -112,7 +112,13 @@ def run(scene, steps, stepping=FixedSteps(), interval=None):  # noqa: B008
 # ------------------------------------------------------------------ frames of reference
 
 
-@pytest.mark.parametrize("slip", SLIPS.values(), ids=SLIPS.keys())
+@pytest.mark.parametrize(
+    "slip",
+    [
+        pytest.param(SLIPS["no slip"], id="no slip"),
+        pytest.param(SLIPS["free slip"], id="free slip", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.run_once
 def test_a_vessel_at_constant_velocity_is_one_at_rest(slip):
     """Galilei. `ShiftingTransport` is left out: the paper's form of it depends on the frame."""
