@@ -20,6 +20,7 @@ import numpy as np
 
 from jaxsph.cli import positive_float, positive_int
 from jaxsph.scenes import cylinder
+from jaxsph.scenes.composed import GHOSTS
 from jaxsph.scenes.cylinder import DIAMETER, SPEED
 
 from .measure import format_rows, number
@@ -27,7 +28,8 @@ from .open_flows import last_turn, mean_along, ran
 from .table import Table, command
 from .wake_runs import harmonic
 
-KEY = ("reynolds", "ends", "resolution", "width", "upstream", "h_over_dx", "mach", "end_time")
+KEY = ("reynolds", "ghosts", "ends", "resolution", "width", "upstream", "h_over_dx", "mach",
+       "end_time")  # fmt: skip
 LITERATURE = {  # of a single cylinder
     20: {"drag": (2.00, 2.05), "wake_length": (0.90, 0.94)},
     40: {"drag": (1.50, 1.55), "wake_length": (2.1, 2.3)},
@@ -48,6 +50,7 @@ def main(argv: list[str] | None = None) -> int:
 def _arguments(add) -> None:
     add("--reynolds", type=positive_float, nargs="+", default=[20.0, 40.0, 100.0, 200.0],
         metavar="RE", help="default: 20 40 100 200")  # fmt: skip
+    add("--ghosts", choices=GHOSTS, default="lattice", help="of the cylinder (default: lattice)")
     add("--ends", choices=("fringe", "openings"), default="fringe", help="default: fringe")
     add("--resolutions", type=positive_int, nargs="+", default=[10], metavar="N",
         help="particles a diameter (default: 10)")  # fmt: skip
@@ -69,8 +72,8 @@ def _run(options) -> bool:
         end = options.t_end or END_TIME[re > SHEDS]
         if re > SHEDS and end < SHORTEST:
             raise ValueError(f"--t-end: at least {SHORTEST:g} s, or lift cannot be seen to swing.")
-        values = (re, options.ends, n, width, ahead, options.h_over_dx, options.mach, end)
-        cases.append(dict(zip(KEY, values, strict=True)))
+        walls, fluid = (options.ghosts, options.ends), (options.h_over_dx, options.mach)
+        cases.append(dict(zip(KEY, (re, *walls, n, width, ahead, *fluid, end), strict=True)))
     for case in kept.left(cases):
         kept.add(case | run(case))
     print(_table(kept.rows))
@@ -118,11 +121,11 @@ def wake_length(scene, trajectory, late) -> float:
 
 
 def _table(rows) -> str:
-    head = ("Re", "ends", "a diameter", "width", "ahead",
+    head = ("Re", "ghosts", "ends", "a diameter", "width", "ahead",
             "drag", "lift", "Strouhal", "wake", "seconds")  # fmt: skip
     names = ("drag", "lift_amplitude", "strouhal", "wake_length", "seconds")
     found = [
-        (number(r["reynolds"]), r["ends"], str(r["resolution"]), number(r["width"]),
+        (number(r["reynolds"]), r["ghosts"], r["ends"], str(r["resolution"]), number(r["width"]),
          number(r["upstream"]), *(number(r.get(name), 4) for name in names)) for r in rows
     ]  # fmt: skip
     return format_rows(head, found)

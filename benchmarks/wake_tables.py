@@ -7,11 +7,13 @@ from .table_text import markdown, results, short
 
 def cylinder_wake() -> str:
     """Coefficients by Reynolds number, resolution and width of the stream."""
-    header = ("Re", "ends", "particles a diameter", "cylinders apart [D]", "stream ahead [D]",
-              "drag", "lift amplitude", "Strouhal", "wake [D]", "steps", "run [s]")  # fmt: skip
+    header = ("Re", "ghosts", "ends", "particles a diameter", "cylinders apart [D]",
+              "stream ahead [D]", "drag", "lift amplitude", "Strouhal", "wake [D]", "steps",
+              "run [s]")  # fmt: skip
     rows = [
         (
             short(row["reynolds"], 3),
+            row["ghosts"],
             row["ends"],
             str(row["resolution"]),
             f"{row['width']:g}",
@@ -27,7 +29,8 @@ def cylinder_wake() -> str:
         for row in sorted(
             results("cylinder_wake"),
             key=lambda row: tuple(
-                row[name] for name in ("reynolds", "ends", "upstream", "width", "resolution")
+                row[name]
+                for name in ("reynolds", "ghosts", "ends", "upstream", "width", "resolution")
             ),
         )
         if row["fault"] is None
