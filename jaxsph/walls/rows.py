@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from contourpy import contour_generator
 from jaxtyping import Array, Float
 
 from ..pairs import Space
+from .region import Region
 
 _FINE = 4  # points a spacing, of the grid on which rows are traced
 _STEEP = 0.01  # squared slope of a signed distance, at least
@@ -59,6 +60,30 @@ def rows_along(
                 places = places - (off / squared)[:, None] * uphill
             found.append(places)
     return np.concatenate(found)
+
+
+def put_in_rows(
+    ghosts: Float[np.ndarray, "ghosts dim"],
+    rows: Float[np.ndarray, "others dim"],
+    parts: Sequence[Region],
+    held: Callable,
+) -> Float[np.ndarray, "all dim"]:
+    """Ghosts with those of some parts of the walls replaced by the rows there.
+
+    Args:
+        ghosts: on the lattice [m].
+        rows: along all walls [m].
+        parts: whose ghosts are replaced.
+        held: parts, places -> for each of the parts, which of the places it holds.
+
+    Raises:
+        ValueError: for a part without a wall.
+    """
+    on_lattice, standing = (held(parts, places) for places in (ghosts, rows))
+    for part, own in zip(parts, standing, strict=True):
+        if not own.any():
+            raise ValueError(f"in_rows: no fixed wall lies in {part}; name parts of these alone.")
+    return np.concatenate([ghosts[~np.any(on_lattice, axis=0)], rows[np.any(standing, axis=0)]])
 
 
 def _from_the_right(ring: np.ndarray) -> np.ndarray:

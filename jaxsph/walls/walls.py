@@ -28,7 +28,7 @@ from .refusals import (
     refuse_torn_walls,
 )
 from .region import Region
-from .rows import rows_along
+from .rows import put_in_rows, rows_along
 
 _POINTS = 4096  # at which a distance is evaluated at a time
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
@@ -128,7 +128,9 @@ class Walls(eqx.Module):
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
         if in_rows:
-            ghosts = _put_in_rows(ghosts, fluid_region, in_rows, space, layers)
+            slope = partial(_in_blocks, _gradient, fluid_region)
+            rows = rows_along(distance, slope, space, layers)
+            ghosts = put_in_rows(ghosts, rows, in_rows, partial(ghosts_in, spacing=space.spacing))
         beside = lattice[(depth < 0.0) & (depth > -space.spacing)]
         refuse_seams(distance, space, beside, _in_blocks(_gradient, fluid_region, beside))
         moved = (*bodies, *free_bodies)
@@ -283,17 +285,6 @@ def _check_parts(parts: Sequence[WallPart], ghosts: np.ndarray, spacing: float) 
                 f"part {part.name}: no ghost lies in {part.region}; let it cover some of the wall, "
                 "several spacings thick, beyond the fluid."
             )
-
-
-def _put_in_rows(ghosts, fluid_region: Region, parts: Sequence[Region], space: Space, layers: int):
-    """The ghosts of some parts of the walls in rows, the others where they are."""
-    distance = partial(_in_blocks, _distance, fluid_region)
-    rows = rows_along(distance, partial(_in_blocks, _gradient, fluid_region), space, layers)
-    on_lattice, standing = (ghosts_in(parts, places, space.spacing) for places in (ghosts, rows))
-    for part, own in zip(parts, standing, strict=True):
-        if not own.any():
-            raise ValueError(f"in_rows: no fixed wall lies in {part}; name parts of these alone.")
-    return np.concatenate([ghosts[~np.any(on_lattice, axis=0)], rows[np.any(standing, axis=0)]])
 
 
 def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:
