@@ -8,8 +8,9 @@ from .body_state import BodyState
 from .effects import Effect
 from .neighbors import WallList
 from .wall_loads import ghost_loads
-from .wall_surface import Loads, WallSurface, moment
+from .wall_surface import Loads, WallSurface, torques
 from .walls import Walls
+from .walls.rotation import angle_rate, spin_rate
 
 
 def body_rates(
@@ -17,7 +18,9 @@ def body_rates(
 ) -> BodyState:
     """Rates of the state of all free bodies:
 
-        M dv/dt = F + M b(x_c),    I dw/dt = T,    dx_c/dt = v,    d(angle)/dt = w.
+        M dv/dt = F + M b(x_c),    d(I w)/dt = T,    dx_c/dt = v,
+
+    and of their angles as `jaxsph.walls.rotation` has them.
 
     Args:
         effects: of the scene.
@@ -31,9 +34,9 @@ def body_rates(
     acceleration = loads.force / mass[:, None]
     for force in context.forces:
         acceleration = acceleration + force.acceleration(context.time, free.state.position)
-    return BodyState(
-        free.state.velocity, free.state.spin, acceleration, loads.torque / inertia
-    )
+    angle, spin = free.state.angle, free.state.spin
+    spun = spin_rate(angle, spin, loads.torque, inertia)
+    return BodyState(free.state.velocity, angle_rate(angle, spin), acceleration, spun)
 
 
 _INERT = ("mass", "inertia")
@@ -52,7 +55,7 @@ def body_loads(
     held = held[:, neighbors.wall.ghosts].astype(position.dtype)
     on_ghosts, shares = ghost_loads(effects, walls, passed, neighbors, held)
     force, torque = (held[1:] @ each for each in on_ghosts)
-    torque = torque - moment(free.state.position.T, force.T)[0]
+    torque = torque - torques(free.state.position, force)
     none = jnp.zeros_like(position[:0])
     for number, center in enumerate(free.state.position):
         arm = free.box.displacement(jnp.broadcast_to(center[None], position.shape), position)

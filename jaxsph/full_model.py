@@ -20,6 +20,7 @@ from .parking import Parking
 from .particles import ParticleState
 from .trajectory import Snapshot
 from .walls import Walls
+from .walls.rotation import within_half_a_turn
 
 DENSITY_BOUNDS = (0.8, 1.2)  # times rho0; weakly compressible flow stays within about one percent
 CFL = 1.5  # dt <= CFL h / c0 (paper)
@@ -127,7 +128,10 @@ class FullModel(Model):
 
     def finish(self, state):
         box = self.functional.space.box
-        return eqx.tree_at(lambda s: s.position, state, box.wrap(state.position))
+        state = eqx.tree_at(lambda s: s.position, state, box.wrap(state.position))
+        if state.bodies is None:
+            return state
+        return eqx.tree_at(lambda s: s.bodies.angle, state, within_half_a_turn(state.bodies.angle))
 
     def inspect(self, step, state, auxiliary):
         here = self._beside(state)

@@ -19,10 +19,11 @@ from .particles import ParticleState
 from .shown import concrete
 from .wall_loads import ghost_loads
 from .wall_surface import Loads, WallSurface
+from .walls.distances import distances
 from .walls.parts import WHOLE
 from .walls.surface import surface
 from .walls.turning import Turning
-from .walls.walls import distances, ghosts_in
+from .walls.walls import ghosts_in
 
 _ENLARGEMENTS = 8  # of the neighbour list, each by a fifth
 

@@ -68,9 +68,14 @@ def reaction(
     position: Float[Array, "points dim"], force: Float[Array, "parts points dim"]
 ) -> Loads:
     """The opposite of forces at points, added up for each part."""
-    torque = moment(jnp.moveaxis(position, 1, 0)[:, None], jnp.moveaxis(force, 2, 0))
-    torque = jnp.stack([jnp.sum(each, axis=1) for each in torque], axis=-1)
-    return Loads(-jnp.sum(force, axis=1), -(torque[:, 0] if torque.shape[1] == 1 else torque))
+    torque = torques(position[None], force)
+    return Loads(-jnp.sum(force, axis=1), -jnp.sum(torque, axis=1))
+
+
+def torques(arm: Float[Array, "... dim"], force: Float[Array, "... dim"]) -> Float[Array, "..."]:
+    """x cross f, a number for each in two dimensions and (..., 3) in three."""
+    found = moment(jnp.moveaxis(arm, -1, 0), jnp.moveaxis(force, -1, 0))
+    return found[0] if len(found) == 1 else jnp.stack(found, axis=-1)
 
 
 def moment(arm, force) -> tuple[Array, ...]:

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from ..walls.distances import distances
 from ..walls.region import Region
-from ..walls.walls import distances
 from .base import Effect
 
 _RANGE = 0.15  # times dx; a particle at rest beside a wall is half a spacing away

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from ..body_state import BodyState
 from ..trajectory import Snapshot
 from ..walls import Walls
+from ..walls.rotation import turned
 from .trajectory_file import opened, patient, read_walls
 
 
@@ -22,11 +24,11 @@ class BodyShapes:
     """Where the ghosts of free bodies are about their centres.
 
     Args:
-        arm: of each ghost from its body's centre of mass, where the body has not turned (G, 2) [m].
+        arm: of each ghost from its body's centre of mass, where the body has not turned (G, n) [m].
         owner: the number of its body (G,).
     """
 
-    arm: Float[np.ndarray, "ghosts 2"]
+    arm: Float[np.ndarray, "ghosts dim"]
     owner: Int[np.ndarray, " ghosts"]
 
     @classmethod
@@ -41,12 +43,11 @@ class BodyShapes:
         center = np.asarray(free.state.position)
         return cls(np.asarray(walls.position)[own] - center[owner], owner)
 
-    def places(self, bodies: BodyState) -> Float[np.ndarray, "ghosts 2"]:
+    def places(self, bodies: BodyState) -> Float[np.ndarray, "ghosts dim"]:
         """Where the ghosts are [m] when the bodies are in a state."""
         angle = np.asarray(bodies.angle)[self.owner]
-        cosine, sine, (x, y) = np.cos(angle), np.sin(angle), self.arm.T
-        turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
-        return np.asarray(bodies.position)[self.owner] + turned
+        arm = turned(jnp.asarray(angle), jnp.asarray(self.arm, angle.dtype))
+        return np.asarray(bodies.position)[self.owner] + np.asarray(arm)
 
 
 def begin_shapes(file: h5py.File, walls: Walls) -> None:

@@ -13,7 +13,6 @@ import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from ..body_state import BodyState
 from ..domain import Box
 from ..io import (
     BodyShapes,
@@ -123,8 +122,7 @@ def _draw(
         ylim=(view.low[1] - margin, view.high[1] + margin),
     )
     fit_box(axes, box)
-    around = walls_with_bodies(walls, shapes, _bodies(first))
-    still, reach = draw_walls(axes, around), 2.0 * margin
+    still, reach = draw_walls(axes, _solid(first, walls, shapes)), 2.0 * margin
     label_panel(figure, axes, squares, field.label, extend="both")
     title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
     fit_squares(figure, [(axes, squares, *still)])
@@ -137,7 +135,7 @@ def _draw(
             squares.set_offsets(position)
             squares.set_array(value[index])
             for grey in still:
-                grey.set_offsets(walls_with_bodies(walls, shapes, _bodies(block)))
+                grey.set_offsets(_solid(block, walls, shapes))
             title.set_text(view.title(block))
             writer.grab_frame()
             if progress is not None:
@@ -145,8 +143,14 @@ def _draw(
             block = next(blocks, None)
 
 
-def _bodies(block: Trajectory) -> BodyState | None:
-    return block.snapshot(0).bodies
+def _solid(block: Trajectory, walls, shapes: BodyShapes | None) -> np.ndarray | None:
+    """Places (G, 2) [m] of what is drawn grey: walls and bodies, of three dimensions what of the
+    bodies is in the layer of the particles drawn."""
+    snapshot = block.snapshot(0)
+    if snapshot.position.shape[1] == 2 or shapes is None:
+        return walls_with_bodies(walls, shapes, snapshot.bodies)
+    places = shapes.places(snapshot.bodies)
+    return places[middle_layer(snapshot.position, places), :2]
 
 
 def _shown(block: Trajectory, field: ParticleField) -> tuple[np.ndarray, np.ndarray]:

@@ -36,15 +36,16 @@ def plane(name: str, position: np.ndarray) -> np.ndarray:
     return position
 
 
-def middle_layer(position: np.ndarray) -> np.ndarray:
-    """Which particles (N, n) [m] to draw in a plane: all of two dimensions, and of three those in a
-    layer one spacing thick in the middle of the third."""
+def middle_layer(position: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+    """Which particles (N, n) [m], or which other points, to draw in a plane: all of two dimensions,
+    and of three those in a layer one spacing of the particles thick, in the middle of the third."""
+    points = position if points is None else points
     if position.shape[1] == 2:
-        return np.ones(len(position), bool)
+        return np.ones(len(points), bool)
     low, high = np.nanmin(position, axis=0), np.nanmax(position, axis=0)
     thickness = float(np.prod(high - low) / len(position)) ** (1.0 / 3.0)
     # off the middle by a quarter, so that of an odd and an even number of layers it holds one
-    above = position[:, 2] - 0.5 * (low[2] + high[2]) + 0.25 * thickness
+    above = points[:, 2] - 0.5 * (low[2] + high[2]) + 0.25 * thickness
     return (above >= 0.0) & (above < thickness)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..io import Overview
 
 
@@ -11,11 +13,23 @@ def body_rows(overview: Overview) -> dict[str, str]:
     """Place, angle and velocity of each free body at last; nothing where there are none."""
     rows = {}
     for number, told in enumerate(overview.bodies):
-        (x, y), (u, v) = told["position"], told["velocity"]
-        (left, low), (right, high) = told["lowest"], told["highest"]
         rows[f"free body {number}"] = (
-            f"at ({x:.5g}, {y:.5g}) m, turned by {math.degrees(told['angle']):.4g} degrees, with "
-            f"({u:.4g}, {v:.4g}) m/s and {told['spin']:.4g} rad/s at last; it was between "
-            f"({left:.5g}, {low:.5g}) and ({right:.5g}, {high:.5g}) m"
+            f"at {_told(told['position'], 5)} m, turned by {_turn(told['angle'])}, with "
+            f"{_told(told['velocity'])} m/s and {_told(told['spin'])} rad/s at last; it was "
+            f"between {_told(told['lowest'], 5)} and {_told(told['highest'], 5)} m"
         )
     return rows
+
+
+def _turn(angle: float | list[float]) -> str:
+    """An angle, or a rotation vector, in degrees."""
+    size = math.hypot(*np.atleast_1d(angle))
+    if np.ndim(angle) == 0 or not size > 0.0:
+        return f"{math.degrees(np.sum(angle)):.4g} degrees"
+    return f"{math.degrees(size):.4g} degrees about {_told(np.divide(angle, size), 3)}"
+
+
+def _told(value: float | list[float], digits: int = 4) -> str:
+    """A number, or components in brackets."""
+    parts = [f"{part:.{digits}g}" for part in np.atleast_1d(value)]
+    return parts[0] if np.ndim(value) == 0 else f"({', '.join(parts)})"

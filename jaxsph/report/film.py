@@ -48,6 +48,7 @@ def film(source: str | os.PathLike) -> str:
         solid = np.zeros((0, 2), np.float32)  # free bodies, grey as what has no value
         if shapes is not None:
             solid = np.float32(shapes.places(snapshot.bodies))
+            solid = solid[middle_layer(snapshot.position, solid), :2]
         places.append(np.concatenate([place, solid]))
         grey = np.full(len(solid), np.nan, np.float32)
         for kept, field in zip(values, fields, strict=True):

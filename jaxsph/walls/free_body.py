@@ -14,31 +14,36 @@ from jaxtyping import Array, Float, Int
 from ..body_state import BodyState
 from ..domain import Box
 from ..pairs import Space
+from ..wall_surface import moment
+from .distances import Cells
 from .region import Region
+from .rotation import across, turned, turned_on
 
-_PARTS = 8  # of a lattice cell's side, for the moments of a region
+_UNEVEN = 1e-6  # of the largest moment of inertia: what its matrix may lack in symmetry
 
 
 @final
 class FreeBody(eqx.Module):
-    """A rigid body in two dimensions that the fluid and the body forces move and turn:
+    """A rigid body that the fluid and the body forces move and turn:
 
-        M dv/dt = F + M b,    I dw/dt = T,    dx_c/dt = v,    d(angle)/dt = w,
+        M dv/dt = F + M b,    d(I w)/dt = T,    dx_c/dt = v,
 
     F and T the force of the fluid and its torque about the centre of mass x_c, the very sums that
-    act on the fluid; b the body forces at x_c.
+    act on the fluid; b the body forces at x_c. In two dimensions d(angle)/dt = w, in three I turns
+    with the body and the angle is a rotation vector (`jaxsph.BodyState`).
 
     Args:
         region: of the body at the start (static).
-        mass: M [kg], of a metre's depth.
-        inertia: I about the centre of mass [kg m^2], of a metre's depth.
-        center: of mass, at the start (2,) [m].
-        velocity: of it at the start (2,) [m/s]; at rest if none is given.
-        spin: at the start [rad/s].
+        mass: M [kg], of a metre's depth in two dimensions.
+        inertia: I about the centre of mass at the start [kg m^2]: a number in two dimensions, of a
+            metre's depth, and a matrix (3, 3) in three.
+        center: of mass, at the start (n,) [m].
+        velocity: of it at the start (n,) [m/s]; at rest if none is given.
+        spin: w at the start [rad/s], about x_c, (3,) in three dimensions; none if none is given.
 
     Raises:
-        ValueError: for a mass or a moment of inertia that is not positive, or shapes of another
-            number of dimensions than two.
+        ValueError: for a mass or a moment of inertia that is not positive, or of another number of
+            dimensions than the box.
 
     Examples:
         >>> import jax.numpy as jnp
@@ -54,8 +59,13 @@ class FreeBody(eqx.Module):
     mass: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     inertia: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     center: Float[Array, " dim"] = eqx.field(converter=jnp.asarray)
-    velocity: Float[Array, " dim"] = eqx.field(converter=jnp.asarray, default=(0.0, 0.0))
-    spin: Float[Array, ""] = eqx.field(converter=jnp.asarray, default=0.0)
+    velocity: Float[Array, " dim"] = eqx.field(converter=jnp.asarray)
+    spin: Float[Array, "..."] = eqx.field(converter=jnp.asarray)
+
+    def __init__(self, region, mass, inertia, center, velocity=None, spin=None):
+        self.region, self.mass, self.inertia, self.center = region, mass, inertia, center
+        self.velocity = jnp.zeros(np.shape(center)) if velocity is None else velocity
+        self.spin = jnp.zeros(np.shape(inertia)[:-1]) if spin is None else spin
 
     @classmethod
     def of_density(
@@ -63,39 +73,47 @@ class FreeBody(eqx.Module):
         region: Region,
         density: float,
         space: Space,
-        velocity: Sequence[float] = (0.0, 0.0),
-        spin: float = 0.0,
+        velocity: Sequence[float] | None = None,
+        spin: float | Sequence[float] | None = None,
     ) -> FreeBody:
         """A body of uniform density [kg/m^3], its mass, centre and moment of inertia summed over
-        the space's lattice, each cell in 8 x 8 parts.
+        the space's lattice, cells at the surface in 8 parts along each axis.
 
         Raises:
-            ValueError: for a density that is not positive, a region that is not within the box, or
-                one in another number of dimensions than two.
+            ValueError: for a density that is not positive, or a region that is not within the box.
         """
         if not density > 0.0:
             raise ValueError(f"free body: its density must be positive, got {density:g} kg/m^3.")
-        _two_dimensions(space.box.dim)
-        area, center, second = _moments(region, space)
-        return cls(region, density * area, density * second, center, tuple(velocity), spin)
+        volume, center, second = _moments(region, space)
+        inertia = np.trace(second)
+        if space.box.dim == 3:
+            inertia = inertia * np.eye(3) - second
+        return cls(region, density * volume, density * inertia, center, velocity, spin)
 
 
 def checked(body: FreeBody, box: Box) -> None:
     """A ValueError for a body that cannot be one of a box."""
-    _two_dimensions(box.dim)
-    for name in ("mass", "inertia"):
-        value = float(getattr(body, name))
+    flat = box.dim == 2
+    shapes = {"mass": (), "inertia": () if flat else (3, 3), "center": (box.dim,),
+              "velocity": (box.dim,), "spin": () if flat else (3,)}  # fmt: skip
+    for name, expected in shapes.items():
+        shape = getattr(body, name).shape
+        if shape != expected:
+            raise ValueError(
+                f"free body: the {name} of {body.region} has shape {shape}, and in {box.dim} "
+                f"dimensions it is {expected}."
+            )
+    inertia = np.atleast_2d(np.asarray(body.inertia))
+    if np.abs(inertia - inertia.T).max() > _UNEVEN * np.abs(inertia).max():
+        raise ValueError(
+            f"free body: the inertia of {body.region} is no symmetric matrix; FreeBody.of_density "
+            "sums it for a density."
+        )
+    for name, value in ("mass", float(body.mass)), ("inertia", np.linalg.eigvalsh(inertia).min()):
         if not value > 0.0:
             raise ValueError(
                 f"free body: the {name} of {body.region} must be positive, got {value:g}; "
                 "FreeBody.of_density sums it for a density."
-            )
-    for name in ("center", "velocity"):
-        shape = getattr(body, name).shape
-        if shape != (2,):
-            raise ValueError(
-                f"free body: the {name} of {body.region} has shape {shape}; give its two "
-                "components."
             )
 
 
@@ -109,8 +127,9 @@ class FreeBodies(eqx.Module):
         depth: of each ghost behind its body's surface [m].
         state: where they are and how they move.
         reach: of each body's surface from its centre [m].
-        layer: dx sum n n^T dA over each body's surface (F, 3, 3), n = (n_x, n_y, (x - x_c) x n):
-            times rho0, the mass and moment of inertia of a layer of fluid one spacing thick.
+        layer: dx sum n n^T dA over each body's surface (F, D, D), n here the normal and after it
+            (x - x_c) x n, D = 3 of them in two dimensions and 6 in three: times rho0, the mass and
+            moment of inertia of a layer of fluid one spacing thick.
         box: of the scene (static).
     """
 
@@ -119,7 +138,7 @@ class FreeBodies(eqx.Module):
     depth: Float[Array, " ghosts"]
     state: BodyState
     reach: Float[Array, " bodies"]
-    layer: Float[Array, "bodies 3 3"]
+    layer: Float[Array, "bodies freedoms freedoms"]
     box: Box = eqx.field(static=True)
 
     @classmethod
@@ -138,7 +157,7 @@ class FreeBodies(eqx.Module):
         spin = jnp.stack([body.spin for body in parts])
         state = BodyState(center, jnp.zeros_like(spin), velocity, spin)
         depth, reach = np.zeros(len(position)), np.zeros(len(parts))
-        layer, dx = np.zeros((len(parts), 3, 3)), space.spacing
+        layer, dx, dim = [], space.spacing, space.box.dim
         for number, body in enumerate(parts):
             own = np.asarray(owner) == number
             distance = np.asarray(body.region.signed_distance(position[own]))
@@ -146,10 +165,10 @@ class FreeBodies(eqx.Module):
             way = np.asarray(position[own]) - np.asarray(body.center)
             reach[number] = (np.linalg.norm(way, axis=1) + depth[own]).max()
             n = np.asarray(normal[own])
-            n = np.concatenate([n, (way[:, :1] * n[:, 1:] - way[:, 1:] * n[:, :1])], axis=1)
-            n = n[depth[own] < dx]  # of which each stands for a spacing of the surface
-            layer[number] = dx**2 * n.T @ n
-        found = (jnp.asarray(each) for each in (reach, layer))
+            n = np.concatenate([n.T, moment(way.T, n.T)])
+            n = n[:, depth[own] < dx]  # of which each stands for a spacing of the surface
+            layer.append(dx**dim * n @ n.T)
+        found = (jnp.asarray(each) for each in (reach, np.stack(layer)))
         return cls(tuple(parts), owner, jnp.asarray(depth), state, *found, space.box)
 
     def at(self, state: BodyState) -> FreeBodies:
@@ -164,12 +183,12 @@ class FreeBodies(eqx.Module):
     ) -> tuple[Float[Array, "ghosts dim"], Float[Array, "ghosts dim"]]:
         """Places [m] and normals of ghosts, those of free bodies taken along to where these are
         then."""
-        angle = self._of_ghosts(then.state.angle - self.state.angle)
+        angles = [self._of_ghosts(each.state.angle) for each in (self, then)]
         here = self._of_ghosts(self.state.position)
         moved = here + self._of_ghosts(then.state.position - self.state.position)
-        arm = turned(angle, position - here)
+        arm, normal_then = (turned_on(*angles, each) for each in (position - here, normal))
         own = (self.owner < len(self.parts))[:, None]
-        return jnp.where(own, moved + arm, position), jnp.where(own, turned(angle, normal), normal)
+        return jnp.where(own, moved + arm, position), jnp.where(own, normal_then, normal)
 
     def ghost_velocity(
         self, position: Float[Array, "ghosts dim"], normal: Float[Array, "ghosts dim"]
@@ -179,17 +198,16 @@ class FreeBodies(eqx.Module):
         Args:
             position, normal: of all ghosts, where the bodies are.
         """
-        arm = self._arm(position, normal)
         spin = self._of_ghosts(self.state.spin)
-        return self._of_ghosts(self.state.velocity) + spin[:, None] * quarter(arm)
+        return self._of_ghosts(self.state.velocity) + across(spin, self._arm(position, normal))
 
     def ghost_acceleration(
         self, position: Float[Array, "ghosts dim"], normal: Float[Array, "ghosts dim"]
     ) -> Float[Array, "ghosts dim"]:
-        """-w^2 (x - x_c) at the surface before each ghost [m/s^2], zero for other walls' ghosts;
-        what the fluid gives the body is not known before the ghosts' pressure is."""
-        spin = self._of_ghosts(self.state.spin)[:, None]
-        return -spin * spin * self._arm(position, normal)
+        """w x (w x (x - x_c)) at the surface before each ghost [m/s^2], zero for other walls'
+        ghosts; what the fluid gives the body is not known before the ghosts' pressure is."""
+        spin = self._of_ghosts(self.state.spin)
+        return across(spin, across(spin, self._arm(position, normal)))
 
     def surface(
         self, position: Float[Array, "ghosts dim"], normal: Float[Array, "ghosts dim"]
@@ -215,14 +233,14 @@ class FreeBodies(eqx.Module):
     @property
     def speed(self) -> Float[Array, ""]:
         """At most of any point of a body [m/s]."""
-        squared = jnp.sum(self.state.velocity**2, axis=1)
-        moving = squared > 0.0  # the root has no slope at rest
-        speed = jnp.where(moving, jnp.sqrt(jnp.where(moving, squared, 1.0)), 0.0)
-        return jnp.max(speed + jnp.abs(self.state.spin) * self.reach)
+        spin = self.state.spin
+        spin = jnp.abs(spin) if spin.ndim == 1 else _size(spin)
+        return jnp.max(_size(self.state.velocity) + spin * self.reach)
 
     def step_share(self, density: Float[Array, ""]) -> Float[Array, ""]:
-        """(1 + L)^(-1/2), the share of the acoustic step at which the lightest body is stable: L is
-        the largest row sum of the matrix of `layer`, times rho0 and by the body's own inertia.
+        """(1 + L)^(-1/2), the share of the acoustic step at which the lightest body is stable: L
+        bounds the eigenvalues of M^-1 rho0 `layer`, M the body's own matrix of mass and inertia, by
+        the largest sum of a row, in units of which M's diagonal is 1.
 
         A body of mass M that rests on a layer of particles of mass m oscillates with it as one on
         a spring, at (1 + m / M)^(1/2) times the layer's own frequency.
@@ -230,9 +248,10 @@ class FreeBodies(eqx.Module):
         Args:
             density: rho0 [kg/m^3].
         """
-        inert = jnp.stack([jnp.stack([b.mass, b.mass, b.inertia]) for b in self.parts])
-        root = jnp.sqrt(inert)
-        relative = density * self.layer / (root[:, :, None] * root[:, None, :])
+        inert = jnp.stack([_inert(body) for body in self.parts])
+        unit = jnp.sqrt(jnp.diagonal(inert, axis1=1, axis2=2))
+        unit = unit[:, :, None] * unit[:, None, :]
+        relative = jnp.linalg.solve(inert / unit, density * self.layer / unit)
         return (1.0 + jnp.max(jnp.sum(jnp.abs(relative), axis=2))) ** -0.5
 
     def _arm(self, position, normal):
@@ -244,44 +263,34 @@ class FreeBodies(eqx.Module):
         return jnp.concatenate([values, zero])[self.owner]
 
 
-def turned(angle: Array, vector: Float[Array, "points 2"]) -> Float[Array, "points 2"]:
-    """Vectors turned by an angle [rad], one for all or one for each."""
-    cosine, sine = jnp.cos(angle), jnp.sin(angle)
-    x, y = vector[:, 0], vector[:, 1]
-    return jnp.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+def _size(vector: Float[Array, "bodies dim"]) -> Float[Array, " bodies"]:
+    squared = jnp.sum(vector**2, axis=1)
+    moving = squared > 0.0  # the root has no slope at rest
+    return jnp.where(moving, jnp.sqrt(jnp.where(moving, squared, 1.0)), 0.0)
 
 
-def quarter(vector: Float[Array, "points 2"]) -> Float[Array, "points 2"]:
-    """Vectors turned by a quarter: e_z x v."""
-    return jnp.stack([-vector[:, 1], vector[:, 0]], axis=1)
+def _inert(body: FreeBody) -> Float[Array, "freedoms freedoms"]:
+    """Mass in each direction and moments of inertia, as one matrix."""
+    dim, inertia = len(body.center), jnp.atleast_2d(body.inertia)
+    mass = body.mass * jnp.eye(dim, dtype=body.mass.dtype)
+    none = jnp.zeros((dim, len(inertia)), mass.dtype)
+    return jnp.block([[mass, none], [none.T, inertia]])
 
 
-def _two_dimensions(dim: int) -> None:
-    if dim != 2:
-        raise ValueError(
-            f"free body: bodies that the fluid moves are known in two dimensions, got {dim}; let "
-            "the body be a MovingBody, whose way is given."
-        )
-
-
-def _moments(region: Region, space: Space) -> tuple[float, np.ndarray, float]:
-    """Area [m^2], centre [m] and polar moment about it [m^4] of a region within the box."""
-
-    def distances(points):
-        return np.asarray(region.signed_distance(jnp.asarray(points)))
-
-    steps = np.asarray(space.steps)
-    offset = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
-    offsets = np.stack(np.meshgrid(offset, offset, indexing="ij"), axis=-1).reshape(-1, 2) * steps
-    cells = space.lattice()
-    cells = cells[distances(cells) < np.hypot(*steps)]
-    points = (cells[:, None] + offsets[None]).reshape(-1, 2)
-    cell = space.cell_volume / len(offsets)
-    share = np.clip(0.5 - distances(points) * _PARTS / steps.min(), 0.0, 1.0)
-    area = float(share.sum() * cell)
-    if not area > 0.0:
+def _moments(region: Region, space: Space) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume V, centre (n,) and second moments about it, the integrals of r_i r_j dV (n, n), of a
+    region within the box; of an area in two dimensions."""
+    cells, steps = Cells.of(region, space), np.asarray(space.steps)
+    if not cells.count > 0.0:
         raise ValueError(f"free body: {region} holds no place of the box; let it lie within.")
-    center = (share[:, None] * points).sum(axis=0) * cell / area
-    own = (steps**2).sum() / _PARTS**2 / 12.0  # of a part about its own centre
-    second = float((share * (((points - center) ** 2).sum(axis=1) + own)).sum() * cell)
-    return area, center, second
+    whole = (cells.whole, np.ones(len(cells.whole)), steps)
+    pieces = (whole, (cells.parts, cells.share, steps / cells.divided))
+    about = np.concatenate([cells.whole, cells.parts]).mean(axis=0)
+    first, second = 0.0, 0.0
+    for points, share, side in pieces:
+        way, size = points - about, side.prod()
+        first = first + size * (share @ way)
+        second = second + size * ((share * way.T) @ way + share.sum() * np.diag(side**2) / 12.0)
+    volume = cells.count * space.cell_volume
+    center = first / volume
+    return volume, about + center, second - volume * np.outer(center, center)

@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..body_state import BodyState
 from ..pairs import Space
+from .distances import distance_in, distances, slope_in, slopes
 from .free_body import FreeBodies, FreeBody, checked
 from .moving_body import Bodies, MovingBody
 from .parts import WallPart
@@ -30,7 +31,6 @@ from .refusals import (
 from .region import Region
 from .rows import put_in_rows, rows_along
 
-_POINTS = 4096  # at which a distance is evaluated at a time
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
 _ON_SURFACE = 1e-3  # times dx: a ghost that near a part's surface lies on it
 
@@ -94,7 +94,7 @@ class Walls(eqx.Module):
             bodies: that are moved through that region. Where one meets a fixed wall it must reach
                 the kernel's support deep into the region, and should stay that far in.
             parts: of the walls, moving bodies among them, whose forces are recorded by name.
-            free_bodies: that the fluid moves, in two dimensions; as far from fixed walls as above.
+            free_bodies: that the fluid moves; as far from fixed walls as above.
             opening: where the fluid may reach past the box's faces, through the buffers of
                 `jaxsph.effects.Openings`.
             in_rows: parts of the fixed walls, in two dimensions, whose ghosts are in rows along
@@ -120,7 +120,7 @@ class Walls(eqx.Module):
         layers = full if layers is None else layers
         if layers < 1:
             raise ValueError(f"layers: at least 1 layer of ghosts, got {layers}.")
-        distance = partial(_in_blocks, _distance, fluid_region)
+        distance = partial(distances, fluid_region)
         refuse_gaps(distance, space, opening)
         refuse_torn_walls(distance, space)
         lattice = space.lattice(layers)
@@ -128,11 +128,11 @@ class Walls(eqx.Module):
         thickness = layers * space.spacing
         ghosts = lattice[(depth >= 0.0) & (depth < thickness)]
         if in_rows:
-            slope = partial(_in_blocks, _gradient, fluid_region)
+            slope = partial(slopes, fluid_region)
             rows = rows_along(distance, slope, space, layers)
             ghosts = put_in_rows(ghosts, rows, in_rows, partial(ghosts_in, spacing=space.spacing))
         beside = lattice[(depth < 0.0) & (depth > -space.spacing)]
-        refuse_seams(distance, space, beside, _in_blocks(_gradient, fluid_region, beside))
+        refuse_seams(distance, space, beside, slopes(fluid_region, beside))
         moved = (*bodies, *free_bodies)
         for body in free_bodies:
             checked(body, space.box)
@@ -224,7 +224,7 @@ class Walls(eqx.Module):
 
     def signed_distance(self, position: Float[Array, "points dim"]) -> Float[Array, " points"]:
         """Distance [m] to the nearest wall, negative in the fluid; see `Region`."""
-        distance = _distance(self.fluid_region, position)
+        distance = distance_in(self.fluid_region, position)
         if self.bodies is None:
             return distance
         return jnp.maximum(distance, -self.bodies.signed_distance(position))
@@ -233,7 +233,7 @@ class Walls(eqx.Module):
         self, number: int, position: Float[Array, "points dim"]
     ) -> Float[Array, " points"]:
         """The same for all walls but the free body of that number."""
-        distance, bodies = _distance(self.fluid_region, position), self.bodies
+        distance, bodies = distance_in(self.fluid_region, position), self.bodies
         others = [k for k in range(len(bodies.free.parts)) if k != number]
         for other in others:
             distance = jnp.maximum(distance, -bodies.free.of_body(other, position))
@@ -295,7 +295,7 @@ def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:
 
 def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
     """Unit normals towards the fluid."""
-    normal = -_in_blocks(_gradient, fluid_region, ghosts)
+    normal = -slopes(fluid_region, ghosts)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     if not np.all(length > 0.5):
         where = ghosts[int(np.argmin(length))]
@@ -309,12 +309,12 @@ def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
 def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Space, thickness):
     """Places at t = 0, normals and owners of the ghosts of bodies in a region of fluid."""
     lattice = space.lattice()
-    lattice = lattice[_in_blocks(_distance, fluid_region, lattice) < 0.0]
-    fixed = partial(_in_blocks, _distance, fluid_region)
-    wet = partial(_in_blocks, _distance, _without(fluid_region, bodies))
+    lattice = lattice[distances(fluid_region, lattice) < 0.0]
+    fixed = partial(distances, fluid_region)
+    wet = partial(distances, _without(fluid_region, bodies))
     found, taken = [], np.zeros(len(lattice), bool)
     for number, body in enumerate(bodies):
-        depth = -_in_blocks(_distance, body.region, lattice)
+        depth = -distances(body.region, lattice)
         held = (depth >= 0.0) & (depth < thickness) & ~taken
         taken |= depth >= 0.0
         ghosts = lattice[held]
@@ -368,35 +368,10 @@ def fill(
     return jnp.take(position, np.flatnonzero(inside), axis=0)
 
 
-def distances(region: Region, points: np.ndarray) -> np.ndarray:
-    """The region's signed distance [m] at many points (P, n) [m], on the host."""
-    return _in_blocks(_distance, region, points)
-
-
-def _in_blocks(function, region: Region, points: np.ndarray) -> np.ndarray:
-    """`function(region, points)` on blocks of equal size, so that it is compiled once."""
-    count = len(points)
-    filler = points[-1:] if count else np.zeros((1, points.shape[1]))
-    missing = -count % _POINTS if count else _POINTS
-    padded = np.concatenate([points, np.repeat(filler, missing, axis=0)])
-    blocks = padded.reshape(-1, _POINTS, points.shape[1])
-    return np.concatenate([np.asarray(function(region, jnp.asarray(b))) for b in blocks])[:count]
-
-
-@partial(jax.jit, static_argnums=0, inline=True)
-def _distance(region: Region, points):
-    return region.signed_distance(points)
-
-
-@partial(jax.jit, static_argnums=0, inline=True)
-def _gradient(region: Region, points):
-    return jax.vmap(jax.grad(lambda x: region.signed_distance(x[None, :])[0]))(points)
-
-
 @partial(jax.jit, static_argnums=0, inline=True)
 def _put_off(region: Region, position, margin: float):
     excess = jnp.maximum(region.signed_distance(position) + margin, 0.0)
-    outward = _gradient(region, position)
+    outward = slope_in(region, position)
     squared = jnp.sum(outward * outward, axis=1)
     near = (excess > 0.0) & (squared > 0.0)
     move = jnp.where(near, excess / jnp.where(near, squared, 1.0), 0.0)

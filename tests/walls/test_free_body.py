@@ -361,13 +361,7 @@ def test_single_precision_stays_single(tank):
 # ------------------------------------------------------------------ what is refused
 
 
-def _solid():
-    space = Space(Box((0.0,) * 3, (2.0,) * 3, (False,) * 3), WendlandC2(), 0.2, 0.1)
-    return FreeBody.of_density(BallRegion((1.0,) * 3, 0.5), 500.0, space)
-
-
 REFUSED = {
-    "three dimensions": (_solid, "known in two dimensions, got 3"),
     "a density below zero": (
         lambda: FreeBody.of_density(BALL, -1.0, SPACE), "density must be positive"
     ),
