@@ -29,6 +29,35 @@ def floating_box() -> str:
     return markdown(header, (line(row) for row in results("floating_box")))
 
 
+def floating_ball() -> str:
+    """Heave of the ball beside linear theory."""
+    header = (
+        "particles a diameter", "tank [m]", "particles", "period [s]", "linear theory",
+        "first trough / lift", "linear theory", "then crest / lift", "linear theory",
+        "sideways / dx", "steps", "run [s]",
+    )  # fmt: skip
+    return markdown(
+        header,
+        (
+            (
+                str(row["resolution"]),
+                f"{row['width']:g}",
+                str(row["particles"]),
+                short(row["period"], 3),
+                short(row["linear_period"], 3),
+                short(row["trough"], 3),
+                short(row["linear_trough"], 3),
+                short(row["crest"], 3),
+                short(row["linear_crest"], 3),
+                short(row["sideways_in_spacings"], 1),
+                str(row["steps"]),
+                short(row["seconds"], 3),
+            )
+            for row in results("floating_ball")
+        ),
+    )
+
+
 def light_bodies() -> str:
     """The longest stable steps of light bodies, and how they start to rise."""
     header = (

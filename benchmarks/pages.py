@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .body_tables import channel_cylinder, floating_box, light_bodies, taylor_couette
+from .body_tables import channel_cylinder, floating_ball, floating_box, light_bodies, taylor_couette
 from .full_tables import (
     cavity_of_pysph,
     dam_break_3d,
@@ -112,6 +112,7 @@ TABLES: dict[str, Callable[[], str]] = {
         wake_models,
         wake_transients,
         floating_box,
+        floating_ball,
         light_bodies,
         channel_cylinder,
         taylor_couette,

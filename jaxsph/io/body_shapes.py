@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.spatial.transform import Rotation
 
 from ..body_state import BodyState
 from ..trajectory import Snapshot
 from ..walls import Walls
-from ..walls.rotation import turned
 from .trajectory_file import opened, patient, read_walls
 
 
@@ -45,9 +44,12 @@ class BodyShapes:
 
     def places(self, bodies: BodyState) -> Float[np.ndarray, "ghosts dim"]:
         """Where the ghosts are [m] when the bodies are in a state."""
-        angle = np.asarray(bodies.angle)[self.owner]
-        arm = turned(jnp.asarray(angle), jnp.asarray(self.arm, angle.dtype))
-        return np.asarray(bodies.position)[self.owner] + np.asarray(arm)
+        angle = np.array(bodies.angle)[self.owner]
+        if self.arm.shape[1] == 2:
+            angle = angle[:, None] * np.array([0.0, 0.0, 1.0])
+        arm = np.pad(self.arm, ((0, 0), (0, 3 - self.arm.shape[1])))
+        arm = Rotation.from_rotvec(angle).apply(arm)[:, : self.arm.shape[1]]
+        return np.asarray(bodies.position)[self.owner] + arm
 
 
 def begin_shapes(file: h5py.File, walls: Walls) -> None:

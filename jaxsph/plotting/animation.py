@@ -26,7 +26,14 @@ from ..io import (
 from ..trajectory import Trajectory
 from .fields import VELOCITY, ParticleField
 from .images import fit_box, with_images
-from .particles import draw_particles, draw_walls, fit_squares, middle_layer, spacing
+from .particles import (
+    draw_particles,
+    draw_walls,
+    fit_squares,
+    grey_squares,
+    middle_layer,
+    spacing,
+)
 from .snapshot import label_panel, panel_size
 from .style import INK, TEXT, sheet
 
@@ -122,7 +129,9 @@ def _draw(
         ylim=(view.low[1] - margin, view.high[1] + margin),
     )
     fit_box(axes, box)
-    still, reach = draw_walls(axes, _solid(first, walls, shapes)), 2.0 * margin
+    solid, reach = _solid(first, walls, shapes), 2.0 * margin
+    in_space = shapes is not None and shapes.arm.shape[1] == 3
+    still = (grey_squares(axes, solid),) if in_space else draw_walls(axes, solid)
     label_panel(figure, axes, squares, field.label, extend="both")
     title = axes.set_title(view.title(first), fontsize=TEXT, color=INK)
     fit_squares(figure, [(axes, squares, *still)])
@@ -146,7 +155,7 @@ def _draw(
 def _solid(block: Trajectory, walls, shapes: BodyShapes | None) -> np.ndarray | None:
     """Places (G, 2) [m] of what is drawn grey: walls and bodies, of three dimensions what of the
     bodies is in the layer of the particles drawn."""
-    snapshot = block.snapshot(0)
+    snapshot = block.snapshot(0).in_flow()
     if snapshot.position.shape[1] == 2 or shapes is None:
         return walls_with_bodies(walls, shapes, snapshot.bodies)
     places = shapes.places(snapshot.bodies)

@@ -116,10 +116,14 @@ def draw_walls(axes: Axes, walls: np.ndarray | None) -> tuple[PathCollection, ..
     (left, bottom), (right, top) = walls.min(axis=0) - margin, walls.max(axis=0) + margin
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     axes.set(xlim=(min(left, x0), max(right, x1)), ylim=(min(bottom, y0), max(top, y1)))
-    squares = axes.scatter(
-        *walls.T, color=WALL, marker="s", linewidths=0, rasterized=True, zorder=0.5
+    return (grey_squares(axes, walls),)
+
+
+def grey_squares(axes: Axes, places: np.ndarray) -> PathCollection:
+    """Grey squares at places (G, 2) [m] of walls and bodies."""
+    return axes.scatter(
+        *places.T, color=WALL, marker="s", linewidths=0, rasterized=True, zorder=0.5
     )
-    return (squares,)
 
 
 def fit_squares(figure: Figure, drawn: Iterable[tuple[Any, ...]]) -> None:

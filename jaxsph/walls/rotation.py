@@ -103,11 +103,13 @@ def spin_rate(angle: Array, spin: Array, torque: Array, inertia: Array) -> Array
 
 
 def _inverse(matrix: Float[Array, "bodies 3 3"]) -> Float[Array, "bodies 3 3"]:
-    """Of each matrix, by its cofactors."""
-    rows = [matrix[:, k] for k in range(3)]
+    """Of each matrix, by its cofactors; in units of its trace, as the cube of a ship's moment of
+    inertia is beyond single precision."""
+    size = jnp.trace(matrix, axis1=1, axis2=2)[:, None, None]
+    rows = [matrix[:, k] / size[:, :, 0] for k in range(3)]
     cofactors = [jnp.cross(rows[(k + 1) % 3], rows[(k + 2) % 3]) for k in range(3)]
     determinant = jnp.sum(rows[0] * cofactors[0], axis=1)
-    return jnp.stack(cofactors, axis=2) / determinant[:, None, None]
+    return jnp.stack(cofactors, axis=2) / determinant[:, None, None] / size
 
 
 def _of(square: Array, exact: Callable[[Array], Array], series: Sequence[float]) -> Array:

@@ -20,12 +20,14 @@ from jaxsph import (
     ParticleState,
     SignedDistance,
     Space,
+    Trajectory,
     WallForces,
     WallPart,
     Walls,
     run_scene,
 )
 from jaxsph.arrangements import JitteredLattice, Lattice
+from jaxsph.body_state import BodyState
 from jaxsph.cli import main
 from jaxsph.effects import (
     Continuity,
@@ -193,6 +195,27 @@ def test_files_and_pictures_have_the_body(kept, tank, capsys):
         assert drawn.n_frames == 6
 
 
+def test_a_body_is_drawn_once_it_comes_into_the_layer_that_is_drawn(tmp_path):
+    """A small one that rises into it; the picture's frame is the particles'."""
+    x = np.stack(np.meshgrid(*[np.arange(10.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    x = x[np.hypot(*(x[:, :2] - 4.5).T) > 1.5]  # room for it
+    steps, still = 3, np.zeros((3, 1, 3))
+    height = np.array([1.0, 2.5, 4.5])
+    center = np.stack([np.full(3, 4.5), np.full(3, 4.5), height], axis=1)[:, None]
+    body, each = BodyState(center, still, still, still), np.ones((steps, len(x)))
+    run = Trajectory(np.arange(3.0), np.stack([x] * 3), 0.0 * np.stack([x] * 3), each, each,
+                     bodies=body)  # fmt: skip
+    arm = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.0, 0.4, 0.0]])
+    frames = []
+    for shapes in (None, BodyShapes(arm, np.zeros(3, int))):
+        with Image.open(run.animate(tmp_path / "rise.gif", shapes=shapes)) as drawn:
+            for number in (0, 2):
+                drawn.seek(number)
+                frames.append(np.asarray(drawn.convert("RGB"), int))
+    assert frames[0].shape == frames[2].shape
+    assert np.array_equal(frames[0], frames[2]) and not np.array_equal(frames[1], frames[3])
+
+
 @pytest.mark.slow
 @pytest.mark.run_once
 def test_where_a_body_turns_is_differentiable(tank, model):
@@ -249,6 +272,7 @@ REFUSED = {
         (1.0, np.eye(3) + np.eye(3, k=1), (0.7,) * 3), "no symmetric matrix"
     ),
     "a moment below zero": ((1.0, np.diag([1.0, 1.0, -1.0]), (0.7,) * 3), "inertia .* positive"),
+    "moments that no body has": ((1.0, np.diag([1.0, 1.0, 2.1]), (0.7,) * 3), "no body has"),
     "a spin that is a number": (
         (1.0, np.eye(3), (0.7,) * 3, (0.0,) * 3, 1.0), "the spin of .* has shape"
     ),
@@ -260,3 +284,14 @@ REFUSED = {
 def test_bad_bodies_are_refused(given, told):
     with pytest.raises(ValueError, match=told):
         Walls.around(TANK, SPACE, free_bodies=(FreeBody(REGION, *given),))
+
+
+def test_a_region_through_a_face_is_refused():
+    for region in (BoxRegion((0.4,) * 3, (1.0, 1.0, 1.8)), BallRegion((0.7, 0.3, 0.7), 0.35)):
+        with pytest.raises(ValueError, match="goes through the box's face at [yz] ="):
+            FreeBody.of_density(region, 500.0, SPACE)
+
+
+def test_whole_numbers_are_taken():
+    body = FreeBody.of_density(REGION, 500, SPACE, velocity=(0, 0, 1), spin=(0, 0, 5))
+    assert body.spin.dtype == body.velocity.dtype == jnp.result_type(float)

@@ -129,3 +129,15 @@ def test_a_tumbling_top_keeps_energy_and_angular_momentum():
     np.testing.assert_allclose(there @ late, inertia @ spin, atol=1e-9)
     assert late @ there @ late == pytest.approx(spin @ inertia @ spin, rel=1e-10)
     assert (turn @ axes[:, 1]) @ axes[:, 1] < 0.0  # it has turned over
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e13])
+def test_beads_and_ships_spin_in_single_precision(size):
+    """Of moments of inertia whose cubes it does not have."""
+    one = jnp.ones((1, 3), jnp.float32)
+    inertia = jnp.asarray(np.diag([1.0, 1.5, 2.0])[None] * size, jnp.float32)
+    rate = spin_rate(0.1 * one, 0.0 * one, size * one, inertia)
+    assert rate.dtype == jnp.float32
+    axes = Rotation.from_rotvec(0.1 * np.ones(3)).as_matrix()
+    expected = axes @ np.diag([1.0, 1.0 / 1.5, 0.5]) @ axes.T @ np.ones(3)
+    np.testing.assert_allclose(rate[0], expected, rtol=1e-5)
