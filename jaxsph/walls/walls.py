@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import final
 
 import equinox as eqx
@@ -32,6 +33,7 @@ from .region import Region
 from .rows import put_in_rows, rows_along
 
 _HAIR = 1e-4  # times its depth: so near the surface a ghost is asked for the wall's velocity
+_FLAT = 0.5  # slope of a signed distance, below which it does not tell where the surface is
 _ON_SURFACE = 1e-3  # times dx: a ghost that near a part's surface lies on it
 
 
@@ -141,7 +143,7 @@ class Walls(eqx.Module):
                 "walls: the region of fluid leaves no place for a wall; let the box be closed in "
                 "some direction, or the region smaller than the box."
             )
-        normal = _normals(fluid_region, ghosts)
+        normal = _normals(fluid_region, ghosts, space.spacing)
         depth = distance(ghosts)[:, None]
         refuse_thin_walls(distance, space, ghosts + depth * normal, normal)
         skin = ghosts + (1.0 - _HAIR) * depth * normal
@@ -293,15 +295,24 @@ def _without(region: Region, bodies: Sequence[MovingBody]) -> Region:
     return region
 
 
-def _normals(fluid_region: Region, ghosts: np.ndarray) -> np.ndarray:
-    """Unit normals towards the fluid."""
+def _normals(fluid_region: Region, ghosts: np.ndarray, spacing: float) -> np.ndarray:
+    """Unit normals towards the fluid; where two faces are as near, one of theirs."""
     normal = -slopes(fluid_region, ghosts)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    if not np.all(length > 0.5):
+    flat = length[:, 0] <= _FLAT
+    if flat.any():  # on the ridge between the two: half a spacing beside it
+        beside = 0.5 * spacing * np.stack(list(product((-1.0, 1.0), repeat=ghosts.shape[1])))
+        points = ghosts[flat][:, None] + beside[None]
+        found = -slopes(fluid_region, points.reshape(-1, ghosts.shape[1])).reshape(points.shape)
+        steepest = np.argmax(np.linalg.norm(found, axis=2), axis=1)
+        normal[flat] = found[np.arange(len(found)), steepest]
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+    if not np.all(length > _FLAT):
         where = ghosts[int(np.argmin(length))]
         raise ValueError(
             f"walls: the signed distance has no slope at {place(where)}; its gradient must point "
-            "away from the fluid everywhere in the wall."
+            "away from the fluid everywhere in the wall. That of a file needs a spacing of half "
+            "the particles' at most."
         )
     return normal / length
 
@@ -323,7 +334,7 @@ def _body_ghosts(fluid_region: Region, bodies: Sequence[MovingBody], space: Spac
                 f"moving body: no ghost lies in {body.region}; it must be in the region of fluid, "
                 "and several spacings thick."
             )
-        normal = _normals(~body.region, ghosts)
+        normal = _normals(~body.region, ghosts, space.spacing)
         surface = ghosts + depth[held][:, None] * normal
         refuse_thin_walls(wet, space, surface, normal)
         behind = np.asarray(space.box.wrap(jnp.asarray(surface - space.support * normal)))

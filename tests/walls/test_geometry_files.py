@@ -9,6 +9,7 @@ from jaxsph import (
     BallRegion,
     Box,
     BoxRegion,
+    FreeBody,
     Outline,
     SampledDistance,
     Space,
@@ -81,6 +82,25 @@ def test_walls_stand_around_a_body_from_a_file(tmp_path):
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
     surface = np.linalg.norm(np.asarray(found.position) - 1.0, axis=1) > 0.3
     assert ((outward * np.asarray(found.normal)).sum(axis=1)[surface] > 0.97).all()
+
+
+def test_a_body_from_a_file_with_edges_is_moved_by_the_fluid(tmp_path):
+    """A can seven spacings across: deep under its edges two of its faces are as near."""
+    path, dx = tmp_path / "can.stl", 0.1
+    trimesh.creation.cylinder(radius=0.35, height=0.7, sections=96).export(str(path))
+    can = solid_from_file(path, 0.5 * dx, offset=(0.7, 0.7, 0.7))
+    space = Space(Box((0.0,) * 3, (1.4,) * 3, (False,) * 3), WendlandC2(), 1.3 * dx, dx)
+    body = FreeBody.of_density(can, 300.0, space)
+    # the grid cuts edges off
+    assert float(body.mass) == pytest.approx(300.0 * np.pi * 0.35**2 * 0.7, rel=0.02)
+    walls = Walls.around(BoxRegion((0.0,) * 3, (1.4,) * 3), space, free_bodies=(body,))
+    own = np.asarray(walls.free.owner) == 0
+    arm, normal = (np.asarray(a)[own] for a in (walls.position - 0.7, walls.normal))
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-12)
+    side = np.hypot(arm[:, 0], arm[:, 1]) > np.abs(arm[:, 2]) + 0.1
+    outward = arm[side, :2] / np.linalg.norm(arm[side, :2], axis=1, keepdims=True)
+    assert ((outward * normal[side, :2]).sum(axis=1) > 0.97).all()
+    assert ((arm * normal).sum(axis=1) > 0.0).all()
 
 
 def test_what_is_no_body_is_refused(tmp_path):
