@@ -26,6 +26,7 @@ from jaxsph.scenes.composed import composed
 from jaxsph.scenes.scales import Scale
 from jaxsph.schemes import Consistent
 
+from .heaving import period
 from .measure import format_rows, number, progress
 from .references.heaving_sphere import Heave
 from .table import Table, command
@@ -79,8 +80,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     sideways = np.linalg.norm(np.ptp(position[:, :2], axis=0))
     return {
         "particles": trajectory.particles,
-        "period": period(time, height),
-        "linear_period": period(time, linear),
+        "period": period(time, height, CROSSINGS),
+        "linear_period": period(time, linear, CROSSINGS),
         **{name: value / lift for name, value in swings(height).items()},
         **{f"linear_{name}": value / lift for name, value in swings(linear).items()},
         "largest_deviation_percent": float(100.0 * deviation),
@@ -130,16 +131,6 @@ def swings(height: np.ndarray) -> dict[str, float]:
     """The lowest height, and the highest after it [m]."""
     lowest = int(np.argmin(height))
     return {"trough": float(height[lowest]), "crest": float(height[lowest:].max())}
-
-
-def period(time: np.ndarray, height: np.ndarray) -> float:
-    """Twice the mean time [s] between the first three crossings of zero."""
-    before = np.flatnonzero(height[:-1] * height[1:] < 0.0)[:CROSSINGS]
-    if len(before) < CROSSINGS:
-        return float("nan")
-    a, b = height[before], height[before + 1]
-    at = time[before] + (time[before + 1] - time[before]) * a / (a - b)
-    return float(2.0 * np.diff(at).mean())
 
 
 if __name__ == "__main__":

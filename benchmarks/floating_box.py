@@ -30,6 +30,7 @@ from jaxsph.scenes.floating_box import (
 )
 from jaxsph.schemes import SCHEMES
 
+from .heaving import period
 from .measure import format_rows, number, progress
 from .references.heave import Tank
 from .table import Table, command
@@ -86,8 +87,8 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         tank = Tank(LENGTH, level, WIDTH, deep, float(scene.walls.free.parts[0].mass),
                     REFERENCE_DENSITY, GRAVITY, CELLS)  # fmt: skip
         linear = tank.heave(trajectory.time, height[0] - rest)
-        row["period"] = period(trajectory.time, height - rest)
-        row["linear_period"] = period(trajectory.time, linear)
+        row["period"] = period(trajectory.time, height - rest, CROSSINGS)
+        row["linear_period"] = period(trajectory.time, linear, CROSSINGS)
         row["period_error_percent"] = 100.0 * (row["period"] / row["linear_period"] - 1.0)
     else:
         late = trajectory.time > 0.5 * END + 1e-9
@@ -103,16 +104,6 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         "steps": scene.steps,
         "environment": environment(),
     }
-
-
-def period(time: np.ndarray, height: np.ndarray) -> float:
-    """Twice the mean time [s] between the first four crossings of zero."""
-    before = np.flatnonzero(height[:-1] * height[1:] < 0.0)[:CROSSINGS]
-    if len(before) < CROSSINGS:
-        return float("nan")
-    a, b = height[before], height[before + 1]
-    at = time[before] + (time[before + 1] - time[before]) * a / (a - b)
-    return float(2.0 * np.diff(at).mean())
 
 
 if __name__ == "__main__":

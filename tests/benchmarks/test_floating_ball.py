@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.floating_ball import KEY, period, run
+from benchmarks.floating_ball import CROSSINGS, KEY, run
+from benchmarks.heaving import period
 from benchmarks.references import heaving_sphere
 from benchmarks.references.heaving_sphere import ADDED_MASS, WAVE_NUMBER, Heave, added_mass
 
@@ -22,7 +23,7 @@ def test_linear_theory_heaves_at_the_sphere_s_own_period(monkeypatch):
     height = Heave(0.15, 9.81).height(time, 0.03)
     assert height[0] == 0.03 and np.abs(height[1:]).max() < 0.03
     late = time > 1.0
-    found = period(time[late], height[late])
+    found = period(time[late], height[late], CROSSINGS)
     own = 2.0 * np.pi / np.sqrt(1.5 / (1.0 + 0.43) * 9.81 / 0.15)
     assert found == pytest.approx(own, rel=0.01)
     monkeypatch.setattr(heaving_sphere, "_STEPS", 2000)
