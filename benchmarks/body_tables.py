@@ -32,7 +32,8 @@ def floating_box() -> str:
 def floating_ball() -> str:
     """Heave of the ball beside linear theory."""
     header = (
-        "particles a diameter", "tank [m]", "particles", "period [s]", "linear theory",
+        "particles a diameter", "its room / volume", "tank [m]", "particles", "period [s]",
+        "linear theory",
         "first trough / lift", "linear theory", "then crest / lift", "linear theory",
         "sideways / dx", "steps", "run [s]",
     )  # fmt: skip
@@ -41,6 +42,7 @@ def floating_ball() -> str:
         (
             (
                 str(row["resolution"]),
+                short(row["room"], 3),
                 f"{row['width']:g}",
                 str(row["particles"]),
                 short(row["period"], 3),

@@ -25,6 +25,7 @@ from jaxsph.scenes import Scene
 from jaxsph.scenes.composed import composed
 from jaxsph.scenes.scales import Scale
 from jaxsph.schemes import Consistent
+from jaxsph.walls.distances import distances
 
 from .heaving import period
 from .measure import format_rows, number, progress
@@ -84,6 +85,7 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
         "linear_period": period(time, linear, CROSSINGS),
         **{name: value / lift for name, value in swings(height).items()},
         **{f"linear_{name}": value / lift for name, value in swings(linear).items()},
+        "room": room(scene),
         "largest_deviation_percent": float(100.0 * deviation),
         "sideways_in_spacings": float(sideways / scene.space.spacing),
         "largest_turn": float(np.linalg.norm(trajectory.bodies.angle, axis=2).max()),
@@ -125,6 +127,13 @@ def floating_ball(case: dict[str, Any]) -> Scene:
         arrangement=Lattice(),
         parameters=case,
     )
+
+
+def room(scene: Scene) -> float:
+    """What the cells of the lattice that are the ball's take up, over its own volume."""
+    body = scene.walls.free.parts[0]
+    cells = distances(body.region, scene.space.lattice()) < 0.0
+    return float(cells.sum() * scene.space.cell_volume * 0.5 * DENSITY / body.mass)
 
 
 def swings(height: np.ndarray) -> dict[str, float]:

@@ -17,7 +17,7 @@ from ..pairs import Space
 from ..wall_surface import moment
 from .distances import Cells, distances
 from .region import Region
-from .rotation import across, turned, turned_on
+from .rotation import across, inverse, turned, turned_on
 
 _UNEVEN = 1e-6  # of the largest moment of inertia: what its matrix may lack in symmetry
 
@@ -263,10 +263,15 @@ class FreeBodies(eqx.Module):
         Args:
             density: rho0 [kg/m^3].
         """
-        inert = jnp.stack([_inert(body) for body in self.parts])
-        unit = jnp.sqrt(jnp.diagonal(inert, axis1=1, axis2=2))
-        unit = unit[:, :, None] * unit[:, None, :]
-        relative = jnp.linalg.solve(inert / unit, density * self.layer / unit)
+        dim = self.box.dim
+        inertia = jnp.stack([jnp.atleast_2d(body.inertia) for body in self.parts])
+        mass = jnp.stack([jnp.broadcast_to(body.mass, (dim,)) for body in self.parts])
+        root = jnp.concatenate([mass, jnp.diagonal(inertia, axis1=1, axis2=2)], axis=1) ** 0.5
+        unit = root[:, :, None] * root[:, None, :]
+        relative = density * self.layer / unit
+        if dim == 3:  # M is more than its diagonal
+            own = inverse(inertia / unit[:, dim:, dim:])
+            relative = jnp.concatenate([relative[:, :dim], own @ relative[:, dim:]], axis=1)
         return (1.0 + jnp.max(jnp.sum(jnp.abs(relative), axis=2))) ** -0.5
 
     def _arm(self, position, normal):
@@ -284,20 +289,13 @@ def _size(vector: Float[Array, "bodies dim"]) -> Float[Array, " bodies"]:
     return jnp.where(moving, jnp.sqrt(jnp.where(moving, squared, 1.0)), 0.0)
 
 
-def _inert(body: FreeBody) -> Float[Array, "freedoms freedoms"]:
-    """Mass in each direction and moments of inertia, as one matrix."""
-    dim, inertia = len(body.center), jnp.atleast_2d(body.inertia)
-    mass = body.mass * jnp.eye(dim, dtype=body.mass.dtype)
-    none = jnp.zeros((dim, len(inertia)), mass.dtype)
-    return jnp.block([[mass, none], [none.T, inertia]])
-
-
 def _refuse_crossing(region: Region, space: Space) -> None:
     """A ValueError for a region that goes through a face of the box."""
     cells, box = space.lattice(), space.box
     for axis in range(box.dim):
+        on_face = cells[cells[:, axis] == cells[0, axis]]
         for face in (box.lower[axis], box.upper[axis]):
-            on_face = np.unique(np.where(np.arange(box.dim) == axis, face, cells), axis=0)
+            on_face[:, axis] = face
             if (distances(region, on_face) < -_UNEVEN * space.spacing).any():
                 raise ValueError(
                     f"free body: {region} goes through the box's face at {'xyz'[axis]} = {face:g} "

@@ -99,10 +99,10 @@ def spin_rate(angle: Array, spin: Array, torque: Array, inertia: Array) -> Array
     own = turned(-angle, spin)
     turning = jnp.einsum("fij,fj->fi", inertia, own)
     left = turned(-angle, torque) - jnp.cross(own, turning)
-    return turned(angle, jnp.einsum("fij,fj->fi", _inverse(inertia), left))
+    return turned(angle, jnp.einsum("fij,fj->fi", inverse(inertia), left))
 
 
-def _inverse(matrix: Float[Array, "bodies 3 3"]) -> Float[Array, "bodies 3 3"]:
+def inverse(matrix: Float[Array, "bodies 3 3"]) -> Float[Array, "bodies 3 3"]:
     """Of each matrix, by its cofactors; in units of its trace, as the cube of a ship's moment of
     inertia is beyond single precision."""
     size = jnp.trace(matrix, axis1=1, axis2=2)[:, None, None]
