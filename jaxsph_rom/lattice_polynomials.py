@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from math import prod
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -71,34 +72,57 @@ class LatticePolynomials(ModeInterpolation):
         return jnp.zeros((), bool)
 
     def __call__(self, position):
-        numbers, weights = zip(*map(self._along, range(self.box.dim), position.T), strict=True)
+        along = self._along(position)
+        return self._sum(position, [[(numbers, weights) for numbers, weights, _ in along]])
+
+    def slope_along(self, position, direction):
+        """direction . grad phi at particles, in one sum over the stencil."""
+        along = self._along(position)
+        moved = [[(numbers, weights) for numbers, weights, _ in along] for _ in along]
+        for k, (numbers, _, slopes) in enumerate(along):
+            moved[k][k] = numbers, [direction[:, k] * slope for slope in slopes]
+        return self._sum(position, moved)
+
+    def _sum(self, position, products) -> Float[Array, "particles functions"]:
+        """Over the stencil, of values weighted by a sum of products of weights along each axis."""
         found = jnp.zeros((position.shape[0], self.functions), self.values.dtype)
         for stencil in product(range(self.order + 1), repeat=self.box.dim):
             row = jnp.zeros(position.shape[0], jnp.int32)
-            weight = jnp.ones((), position.dtype)
             for k, place in enumerate(stencil):
-                row = row * self.shape[k] + numbers[k][place]
-                weight = weight * weights[k][place]
+                row = row * self.shape[k] + products[0][k][0][place]
+            weight = sum(
+                prod(weights[place] for (_, weights), place in zip(axes, stencil, strict=True))
+                for axes in products
+            )
             there = self.values.at[row].get(mode="promise_in_bounds", wrap_negative_indices=False)
             found = found + weight[:, None] * there
         return found
 
-    def _along(self, k: int, x: Float[Array, " particles"]):
-        """Numbers along direction k of the p + 1 points about each x, and their weights there."""
+    def _along(self, position) -> list[tuple[list[Array], list[Array], list[Array]]]:
+        """Along each axis, of the p + 1 points about each particle, their numbers, their weights
+        there and the weights' slopes [1/m]."""
+        return list(map(self._along_axis, range(self.box.dim), position.T))
+
+    def _along_axis(self, k: int, x: Float[Array, " particles"]):
         count, last = self.shape[k], self.order
-        place = (x - self.box.lower[k]) * (count / self.box.lengths[k]) - 0.5
+        per_length = count / self.box.lengths[k]
+        place = (x - self.box.lower[k]) * per_length - 0.5
         first = jnp.floor(place).astype(jnp.int32) - last // 2
         if not self.box.periodic[k]:
             first = jnp.clip(first, 0, count - 1 - last)
         local = place - first.astype(x.dtype)
-        numbers, weights = [], []
+        numbers, weights, slopes = [], [], []
         for j in range(last + 1):
             number = first + j
             numbers.append(number % count if self.box.periodic[k] else number)
             others = [i for i in range(last + 1) if i != j]
             factors = [(local - i) / (j - i) for i in others]
-            weights.append(jnp.prod(jnp.stack(factors), axis=0))
-        return numbers, weights
+            weights.append(prod(factors))
+            slopes.append(
+                sum(per_length / (j - i) * prod(factors[:n] + factors[n + 1 :], start=1.0)
+                    for n, i in enumerate(others))
+            )  # fmt: skip
+        return numbers, weights, slopes
 
 
 def on_lattice(points: Float[np.ndarray, "points dim"], space: Space, order: int = 3) -> bool:

@@ -7,7 +7,6 @@ from typing import Self
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
@@ -71,10 +70,10 @@ class ModeInterpolation(eqx.Module):
     ) -> Float[Array, "particles functions"]:
         """The functions at particles; meaningless if `overflow` is true."""
 
-    def gradient(
-        self, position: Float[Array, "particles dim"]
-    ) -> Float[Array, "particles functions dim"]:
-        """Their gradients there; the points of a particle's stencil are read once for all."""
-        axes = jnp.eye(position.shape[1], dtype=position.dtype)
-        moved = [jnp.broadcast_to(axis, position.shape) for axis in axes[:, None]]
-        return jnp.stack([jax.jvp(self, (position,), (d,))[1] for d in moved], axis=2)
+    def slope_along(
+        self,
+        position: Float[Array, "particles dim"],
+        direction: Float[Array, "particles dim"],
+    ) -> Float[Array, "particles functions"]:
+        """direction . grad phi at particles."""
+        return jax.jvp(self, (position,), (direction,))[1]

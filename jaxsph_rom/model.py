@@ -188,7 +188,7 @@ class ReducedModel(Model):
 
         def carried():
             fields = self.interpolation.combined(self.basis.combination(coordinates)[0])
-            return jnp.sum(fields.gradient(position) * rates.position[:, None], axis=2)
+            return fields.slope_along(position, rates.position)
 
         found = self.advection.remaining(seen, particles.density, carried)
         return found.reshape(-1), rates.position

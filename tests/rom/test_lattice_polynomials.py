@@ -86,9 +86,24 @@ def test_derivatives_in_position():
     tangent = jax.jvp(made, (places,), (step,))[1]
     central = (made(places + 1e-6 * step) - made(places - 1e-6 * step)) / 2e-6
     np.testing.assert_allclose(tangent, central, atol=1e-7)
-    for fitted in (made, LocalSplines.fit(points, np.sin(2.0 * np.pi * points), PERIODIC)):
-        along_each = jax.vmap(jax.jacfwd(lambda x, fitted=fitted: fitted(x[None])[0]))(places)
-        np.testing.assert_allclose(fitted.gradient(places), along_each, atol=1e-12)
+
+
+BOX_IN_SPACE = Box((0.0, -0.5, 0.0), (1.0, 0.3, 0.7), (True, False, True))
+IN_SPACE = Space(BOX_IN_SPACE, WendlandC2(), 2.0 * DX, DX)
+
+
+@pytest.mark.parametrize("space", [PERIODIC, CLOSED, IN_SPACE])
+@pytest.mark.parametrize("rule, order", [
+    (LatticePolynomials, 1), (LatticePolynomials, 3), (LatticePolynomials, 5), (LocalSplines, 3)
+])  # fmt: skip
+def test_slopes_along_a_direction_are_those_of_the_gradient(space, rule, order):
+    points, places = lattice(space), inside(space, 8)
+    values = np.stack([np.sin(2.0 * points[:, 0]), np.prod(points, axis=1)], axis=1)
+    fitted = rule.fit(points, values, space, order)
+    gradient = jax.vmap(jax.jacfwd(lambda x: fitted(x[None])[0]))(places)
+    direction = jnp.asarray(np.random.default_rng(1).normal(size=places.shape))
+    wanted = jnp.einsum("pfk,pk->pf", gradient, direction)
+    np.testing.assert_allclose(fitted.slope_along(places, direction), wanted, atol=1e-11)
 
 
 def test_what_is_no_lattice_is_refused():
