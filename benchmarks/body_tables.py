@@ -109,9 +109,11 @@ def channel_cylinder() -> str:
 
 def taylor_couette() -> str:
     """Torques between cylinders."""
-    header = ("ghosts", "turns", "to the inner radius", "torque, inner", "outer", "velocity")
+    header = (
+        "ghosts", "turns", "h / dx", "to the inner radius", "torque, inner", "outer", "velocity"
+    )  # fmt: skip
     names = ("inner_torque_error_percent", "outer_torque_error_percent", "velocity_error_percent")
-    order = ("ghosts", "turns", "resolution")
+    order = ("ghosts", "turns", "h_over_dx", "resolution")
     rows = sorted(results("taylor_couette"), key=lambda row: [row[name] for name in order])
     return markdown(
         header,
@@ -119,6 +121,7 @@ def taylor_couette() -> str:
             (
                 row["ghosts"],
                 row["turns"],
+                short(row["h_over_dx"]),
                 str(row["resolution"]),
                 *(f"{short(row[name], 2)} %" for name in names),
             )

@@ -57,7 +57,7 @@ def _run(options) -> None:
     )
     for case in kept.left(cases):
         kept.add(case | run(case))
-    names = ("scheme", "ghosts", "turns", "resolution")
+    names = ("scheme", "ghosts", "turns", "h_over_dx", "resolution")
     found = ("inner_torque_error_percent", "outer_torque_error_percent", "velocity_error_percent")
     rows = [(*(str(r[n]) for n in names), *(number(r[n], 3) for n in found)) for r in kept.rows]
     print(format_rows((*names, "inner %", "outer %", "velocity %"), rows))

@@ -30,13 +30,17 @@ def test_it_starts_from_the_exact_flow(turns):
 
 def test_stored_torques_converge():
     rows = {
-        (r["ghosts"], r["turns"], r["resolution"]): r for r in json.loads(ROWS.read_text())["rows"]
+        (r["ghosts"], r["turns"], r["h_over_dx"], r["resolution"]): r
+        for r in json.loads(ROWS.read_text())["rows"]
     }
     for turns in ("inner", "outer"):
         for wall in ("inner", "outer"):
             name = f"{wall}_torque_error_percent"
-            assert abs(rows["lattice", turns, 16][name]) < abs(rows["lattice", turns, 8][name])
-            assert max(abs(rows["rows", turns, n][name]) for n in (8, 12, 16)) < 1.5
+            coarse, fine = (abs(rows["lattice", turns, 2.0, n][name]) for n in (8, 16))
+            assert fine < coarse
+            assert max(abs(rows["rows", turns, 2.0, n][name]) for n in (8, 12, 16)) < 1.5
+            for h, most in ((2.5, 0.5), (3.0, 0.2)):
+                assert max(abs(rows["rows", turns, h, n][name]) for n in (12, 16)) < most
 
 
 def test_bad_input_is_refused():
