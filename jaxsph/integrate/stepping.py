@@ -8,12 +8,12 @@ from typing import Any, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax import lax
 from jaxtyping import Array, Float
 
 from .checkpoints import checkpointed_scan
 from .faults import Fault, FaultCode
 from .model import Model
+from .one_or_many import moved_if
 from .runge_kutta import RK4
 from .stepper import Stepper
 
@@ -77,7 +77,7 @@ class FixedSteps(Stepping):
                 return _step(self.stepper, model, state, auxiliary, number, time, time_step)[:3]
 
             good = carry[2].code == int(FaultCode.NONE)
-            return lax.cond(good, move, lambda carry: carry, carry)
+            return moved_if(good, move, carry)
 
         numbers = start + 1 + jnp.arange(steps, dtype=jnp.int32)
         began = start.astype(time_step.dtype) * time_step
@@ -127,7 +127,7 @@ class AutomaticSteps(Stepping):
             return new, auxiliary, fault, elapsed + step, model.largest_change(state, new) / step
 
         def step(carry, _):
-            return lax.cond(going(carry), move, lambda carry: carry, carry)
+            return moved_if(going(carry), move, carry)
 
         zero = jnp.zeros((), time_step.dtype)
         carry = (*model.at(began).begin(state), fault, zero, zero)

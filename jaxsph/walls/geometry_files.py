@@ -25,7 +25,8 @@ def outline_from_file(
     SVG and DXF drawings are read by trimesh (`pip install "jaxsph[geometry]"`); curves become
     polygons. Any other file is a table of two columns x, y with one polygon, or several with empty
     lines between them; lines that do not hold two numbers, such as the name on top of an airfoil's
-    file, are passed over.
+    file, are passed over. An SVG's y points down: what it holds is turned up about its middle, so
+    that it stands as drawn between the numbers of its file.
 
     Args:
         path: of the file.
@@ -37,14 +38,17 @@ def outline_from_file(
     """
     path = _existing(path)
     if path.suffix.lower() in _DRAWINGS:
-        drawing = _trimesh("an SVG or DXF file").load_path(str(path))
-        polygons = drawing.polygons_full
+        polygons = _drawing(path).polygons_full
         if not len(polygons):
             raise ValueError(f"{path}: holds no closed outline; close its lines.")
-        rings = [ring.coords for p in polygons for ring in (p.exterior, *p.interiors)]
+        rings = [np.asarray(r.coords)[:, :2] for p in polygons for r in (p.exterior, *p.interiors)]
+        if path.suffix.lower() == ".svg":
+            heights = np.concatenate(rings)[:, 1]
+            middle = heights.min() + heights.max()
+            rings = [np.stack([ring[:, 0], middle - ring[:, 1]], axis=1) for ring in rings]
     else:
         rings = _table(path)
-    return Outline([scale * np.asarray(ring)[:, :2] + np.asarray(offset) for ring in rings])
+    return Outline([scale * np.asarray(ring) + np.asarray(offset) for ring in rings])
 
 
 def solid_from_file(
@@ -81,6 +85,7 @@ def solid_from_file(
             f"{path}: its surface is not closed, so that nothing is inside; close its holes, by "
             "trimesh's `repair.fill_holes` or in the program that made it."
         )
+    mesh.fix_normals()  # outwards, which is how the inside is told
     mesh.apply_scale(scale)
     mesh.apply_translation(offset)
     lower, upper = mesh.bounds
@@ -98,6 +103,14 @@ def _existing(path: str | Path) -> Path:
     if not path.is_file():
         raise ValueError(f"{path}: no such file.")
     return path
+
+
+def _drawing(path: Path) -> Any:
+    trimesh = _trimesh("an SVG or DXF file")
+    try:
+        return trimesh.load_path(str(path))
+    except Exception as error:  # of the XML reader, of number words, of shapes: each has its own
+        raise ValueError(f"{path}: could not be read as a drawing: {error}") from None
 
 
 def _trimesh(what: str) -> Any:

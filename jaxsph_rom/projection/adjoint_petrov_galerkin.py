@@ -28,4 +28,4 @@ class AdjointPetrovGalerkin(Projection):
     def reduce(self, inverse, functional, state):
         rates, jacobian, beside = jax.linearize(functional, state, has_aux=True)
         memory = jacobian(inverse.complement(rates))
-        return inverse(rates + self.tau * memory), beside
+        return inverse(rates + self.tau.astype(rates.dtype) * memory), beside

@@ -250,3 +250,11 @@ def test_a_blow_up_is_named(trained):
     wild = ReducedState(start.coordinates * 1e3, start.position)
     with pytest.raises(jaxsph.SimulationError, match="step 1"):
         jaxsph.simulate(model, wild, jaxsph.Schedule(scene.time_step, 2, 2))
+
+
+def test_a_memory_length_in_double_precision_leaves_single_precision_alone():
+    ones = jnp.ones(4, jnp.float32)
+    inverse = PseudoInverse(jnp.eye(4, 2, dtype=jnp.float32), ones)
+    projection = AdjointPetrovGalerkin(np.float64(0.1))
+    rates, _ = projection.reduce(inverse, lambda state: (jnp.float32(2.0) * state, ()), ones)
+    assert rates.dtype == jnp.float32

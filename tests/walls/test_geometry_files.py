@@ -49,6 +49,29 @@ def test_drawings_are_read(tmp_path):
     np.testing.assert_allclose(disc, exact, atol=0.02 * 0.5)  # by how finely it draws arcs
 
 
+def test_a_drawing_stands_as_it_is_drawn(tmp_path):
+    """An L whose foot is drawn at the lower right, where an SVG's y is greater."""
+    path = tmp_path / "l.svg"
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg">'
+        '<path d="M0,1 L1,1 L1,3 L3,3 L3,4 L0,4 Z"/></svg>'
+    )
+    outline = outline_from_file(path, scale=2.0, offset=(0.0, 1.0))
+    foot, above = outline.signed_distance(jnp.asarray([[5.0, 4.0], [5.0, 8.0]]))
+    assert foot < 0.0 < above
+
+
+def test_a_surface_that_faces_inwards_is_turned_round(tmp_path):
+    found = []
+    for name, mesh in (("box", trimesh.creation.box()), ("inverted", trimesh.creation.box())):
+        if name == "inverted":
+            mesh.invert()
+        mesh.export(str(tmp_path / f"{name}.stl"))
+        found.append(solid_from_file(tmp_path / f"{name}.stl", 0.25))
+    points = jnp.asarray(np.random.default_rng(0).uniform(-0.7, 0.7, (50, 3)))
+    np.testing.assert_allclose(*(f.signed_distance(points) for f in found), atol=1e-12)
+
+
 @pytest.mark.slow
 def test_a_ball_s_surface_is_that_of_the_ball(tmp_path):
     path, radius, spacing = tmp_path / "ball.stl", 0.5, 0.05
@@ -114,6 +137,10 @@ def test_what_is_no_body_is_refused(tmp_path):
     path.write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0 0 L 2 0 L 2 1"/></svg>')
     with pytest.raises(ValueError, match="no closed outline"):
         outline_from_file(path)
+    for name in ("bad.svg", "bad.dxf"):
+        (tmp_path / name).write_text("no drawing")
+        with pytest.raises(ValueError, match=f"{name}: could not be read as a drawing"):
+            outline_from_file(tmp_path / name)
     mesh = trimesh.creation.box()
     mesh.update_faces(np.arange(len(mesh.faces)) > 1)
     mesh.export(str(tmp_path / "open.stl"))

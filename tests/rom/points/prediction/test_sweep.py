@@ -45,6 +45,16 @@ def make_flow(growth=0.0):
     return ReducedFlow(ReferenceSpace(points, space, ShepardMap), basis, system, fluid)
 
 
+def test_members_are_one_product_with_a_matrix_that_they_share():
+    flow, members = make_flow(), 64
+    times = prediction_sweep.EvenTimes.of(STEPS, np.dtype(float))
+    arguments = jnp.zeros((members, MODES)), jnp.full((members, 1), 0.01)
+    lowered = prediction_sweep.batch_of.lower(flow.system, flow.bound, times, *arguments)
+    products = [line for line in lowered.as_text().splitlines() if "dot_general" in line]
+    assert any(f"-> tensor<{MODES}x{members}xf64>" in line for line in products)
+    assert not any(f"<{members}x{MODES}x{MODES}" in line for line in products)
+
+
 @pytest.mark.parametrize("batch", [3, 7, 100])
 def test_members_are_single_runs(batch):
     flow = make_flow()

@@ -1,0 +1,54 @@
+"""A step that is taken or not: a branch for one run, a choice for each member of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jax.custom_batching import custom_vmap
+from jaxtyping import Array, Bool
+
+
+def moved_if(going: Bool[Array, ""], move: Callable[[Any], Any], carry: Any) -> Any:
+    """`move(carry)` where a run is going, else its carry.
+
+    Alone it is `lax.cond`, and what does not go on costs nothing. `jax.vmap` of that would give
+    each member a copy of all that `move` reads, of a tensor model its tensors; so members of a
+    batch all move, and of each what it shall have is chosen.
+
+    Args:
+        going: whether.
+        move: pure; makes a carry of a carry.
+        carry: a pytree.
+    """
+
+    def chosen(carry):
+        take = _among_many(going)
+        return jax.tree.map(lambda new, old: lax.select(take, new, old), move(carry), carry)
+
+    return lax.cond(_alone(going), chosen, lambda carry: carry, carry)
+
+
+@custom_vmap
+def _alone(going):
+    """Of one run whether it goes on; true in a batch."""
+    return going
+
+
+@_alone.def_vmap
+def _(size, batched, going):
+    return jnp.ones((), bool), False
+
+
+@custom_vmap
+def _among_many(going):
+    """True of one run, which has been asked; of a batch which members go on."""
+    return jnp.ones((), bool)
+
+
+@_among_many.def_vmap
+def _(size, batched, going):
+    return going, True
