@@ -46,8 +46,8 @@ def sweep(
     `jax.distributed` over those of all processes, which call this alike. What is written after each
     round stays: the same call goes on where a killed one ended. A member that meets a fault ends
     alone, with the snapshots that it had; one whose neighbour list overflows is run anew with more
-    room. One whose particles have clumped at its end is named in a warning. Forces on walls and free
-    bodies are not in the file.
+    room. One whose particles have clumped at its end is named in a warning. Forces on walls and
+    free bodies are not in the file.
 
     Args:
         scenes: that differ in what their arrays hold: coefficients and starts.
