@@ -85,7 +85,10 @@ def solid_from_file(
             f"{path}: its surface is not closed, so that nothing is inside; close its holes, by "
             "trimesh's `repair.fill_holes` or in the program that made it."
         )
-    mesh.fix_normals()  # outwards, which is how the inside is told
+    if not mesh.is_winding_consistent:
+        mesh.fix_normals()  # outwards, which is how the inside is told
+    elif mesh.volume < 0.0:
+        mesh.invert()  # as a whole: a cavity's surface faces into it
     mesh.apply_scale(scale)
     mesh.apply_translation(offset)
     lower, upper = mesh.bounds

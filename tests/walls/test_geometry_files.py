@@ -53,8 +53,7 @@ def test_a_drawing_stands_as_it_is_drawn(tmp_path):
     """An L whose foot is drawn at the lower right, where an SVG's y is greater."""
     path = tmp_path / "l.svg"
     path.write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg">'
-        '<path d="M0,1 L1,1 L1,3 L3,3 L3,4 L0,4 Z"/></svg>'
+        '<svg xmlns="http://www.w3.org/2000/svg"><path d="M0,1 L1,1 L1,3 L3,3 L3,4 L0,4 Z"/></svg>'
     )
     outline = outline_from_file(path, scale=2.0, offset=(0.0, 1.0))
     foot, above = outline.signed_distance(jnp.asarray([[5.0, 4.0], [5.0, 8.0]]))
@@ -62,14 +61,31 @@ def test_a_drawing_stands_as_it_is_drawn(tmp_path):
 
 
 def test_a_surface_that_faces_inwards_is_turned_round(tmp_path):
+    turned, mixed = trimesh.creation.box(), trimesh.creation.box()
+    turned.invert()
+    mixed.faces[:2] = mixed.faces[:2, ::-1]
     found = []
-    for name, mesh in (("box", trimesh.creation.box()), ("inverted", trimesh.creation.box())):
-        if name == "inverted":
-            mesh.invert()
+    for name, mesh in (("box", trimesh.creation.box()), ("turned", turned), ("mixed", mixed)):
         mesh.export(str(tmp_path / f"{name}.stl"))
         found.append(solid_from_file(tmp_path / f"{name}.stl", 0.25))
     points = jnp.asarray(np.random.default_rng(0).uniform(-0.7, 0.7, (50, 3)))
-    np.testing.assert_allclose(*(f.signed_distance(points) for f in found), atol=1e-12)
+    for other in found[1:]:
+        expected = found[0].signed_distance(points)
+        np.testing.assert_allclose(other.signed_distance(points), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_a_cavity_stays_one(tmp_path, inverted):
+    """A box with a void in it, whichever way its surfaces face."""
+    inner = trimesh.creation.box((0.4,) * 3)
+    inner.invert()
+    hollow = trimesh.util.concatenate([trimesh.creation.box(), inner])
+    if inverted:
+        hollow.invert()
+    hollow.export(str(tmp_path / "hollow.stl"))
+    region = solid_from_file(tmp_path / "hollow.stl", 0.05)
+    void, solid, out = region.signed_distance(jnp.asarray([[0.0] * 3, [0.35] * 3, [0.6] * 3]))
+    assert void > 0.0 > solid and out > 0.0
 
 
 @pytest.mark.slow
