@@ -42,6 +42,7 @@ from .run_scene import run_scene as run_scene
 from .schedule import Schedule as Schedule
 from .simulate import simulate as simulate
 from .sweeps import read_member as read_member
+from .sweeps import read_member_forces as read_member_forces
 from .sweeps import read_status as read_status
 from .sweeps import sweep as sweep
 from .timing import Timing as Timing

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from .full_model import FullModel
 from .integrate import Model
 from .particles import ParticleState
+from .trajectory import Snapshot
 from .wall_forces import WallForces, loads_of
 from .wall_surface import Loads
 
@@ -114,5 +115,6 @@ class ForcesOverTime(Model):
     def largest_change(self, old, new):
         return self.model.largest_change(old.particles, new.particles)
 
-    def observe(self, state) -> Any:
-        return self.model.observe(state.particles)
+    def observe(self, state) -> tuple[Snapshot, Loads]:
+        """The particles, and the impulse since the start."""
+        return self.model.observe(state.particles), state.impulse

@@ -108,6 +108,23 @@ def test_run_taken_up_again_has_the_means_of_an_unbroken_one(scene, tmp_path):
     np.testing.assert_array_equal(copy.mean_torques["ball"], whole.mean_torques["ball"])
 
 
+def test_the_last_fifth_is_weighed_by_time(tmp_path):
+    """Seven intervals: 0.4 of the sixth and the seventh; of instants those that lie in it."""
+    time, at = np.arange(8.0), np.zeros((8, 1, 2))
+    force = np.stack([10.0 * time**2, time], axis=1)
+    told = {}
+    for name, means in (("means", {"walls": force}), ("instants", {})):
+        run = jaxsph.Trajectory(
+            time, at, at, at[:, :, 0], at[:, :, 0], forces={"walls": force},
+            torques={"walls": time}, mean_forces=means, mean_torques={k: time for k in means},
+        )  # fmt: skip
+        told[name] = read_overview(run.save(tmp_path / f"{name}.h5")).forces["walls"]
+    wanted = (0.4 * force[6] + force[7]) / 1.4
+    np.testing.assert_allclose(told["means"]["mean_force"], wanted, rtol=1e-14)
+    assert told["means"]["mean_torque"] == pytest.approx((0.4 * 6.0 + 7.0) / 1.4)
+    np.testing.assert_allclose(told["instants"]["mean_force"], force[6:].mean(axis=0))
+
+
 def test_only_named_parts_are_followed_over_time():
     tank = WallForces.of(hydrostatic_tank(16))
     assert named(tank) is None and named(None) is None

@@ -37,7 +37,9 @@ def _animate(options) -> int:
     from .. import plotting  # matplotlib takes its time to load
 
     path = options.out or options.file.parent
-    path = path if path.suffix else path / f"{options.file.stem}.gif"
+    ending = path.suffix[1:]
+    if path.is_dir() or not (ending.isalpha() or ending == "mp4"):  # a folder, run_0.5 say
+        path = path / f"{options.file.stem}.gif"
     overview = read_overview(options.file)
     every = options.every or max(1, -(-overview.snapshots // FRAMES))
     count = -(-overview.snapshots // every)

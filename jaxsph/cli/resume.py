@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -222,6 +223,13 @@ def _check_later(end_time: float, scene: Scene, checkpoint: Checkpoint) -> None:
     done = max(0, checkpoint.step) * scene.time_step
     if not end_time > done * (1.0 + 1e-9):
         raise ValueError(f"--t-end: the run has come to t = {done:g} s; give a later time.")
+    interval = scene.schedule.interval
+    number = max(math.floor(end_time / interval), round(done / interval) + 1)
+    if abs(end_time - round(end_time / interval) * interval) > 1e-6 * end_time:
+        raise ValueError(
+            f"--t-end: {end_time:g} s lies between snapshots, which the run has every "
+            f"{interval:g} s; give {number * interval:.6g} or {(number + 1) * interval:.6g}."
+        )
 
 
 def _later(scene: Scene, state: ParticleState) -> Scene:

@@ -45,7 +45,7 @@ def add_scene_options(parser: Parser, words: list[str], apart: dict[str, Any] = 
         parser: of the command.
         words: of the command line, after the command.
         apart: how the Reynolds number and the seed, by which members of a sweep differ, are read
-            instead; None where they are no options.
+            instead.
     """
     add, scene = parser.add_argument, scene_word(words)
     add("scene", metavar="SCENE",
@@ -57,7 +57,7 @@ def add_scene_options(parser: Parser, words: list[str], apart: dict[str, Any] = 
     takes = _SHARED if make is None else inspect.signature(make).parameters
     settings = {}
     for name, (flag, how) in _SHARED.items():
-        if name in takes and apart.get(name, how) is not None:
+        if name in takes:
             settings[add(flag, **(how | apart.get(name, {}))).dest] = name
     if "arrangement" in takes:
         settings[add("--seed", **(_SEED | apart.get("seed", {}))).dest] = "arrangement"

@@ -101,7 +101,7 @@ class MovingFrame(BodyForce):
 
     def acceleration(self, time, position):
         second = jax.jacfwd(jax.jacfwd(self.displacement))(time)
-        return jnp.broadcast_to(-second[None, :], position.shape)
+        return jnp.broadcast_to(-second[None, :], position.shape).astype(position.dtype)
 
 
 class KickAndHold(BodyForce):

@@ -55,10 +55,18 @@ class Fringe(Effect):
         position = fields["position"]
         along = (position[:, 0] - self.start) / (self.end - self.start)
         share = jnp.where(along <= 1.0, ramp(along, 0.0, _RISE), 0.0)[:, None]
-        now = (context.time,)
-        inflow, change = jax.jvp(partial(self.profile, position), now, (jnp.ones_like(now[0]),))
+        inflow, change = held(self.profile, position, context.time)
         pull = change - self.rate * (fields["velocity"] - inflow)
         return rates | {"velocity": rates["velocity"] + share * (pull - rates["velocity"])}
+
+
+def held(
+    profile: eqx.Module, position: Float[Array, "points dim"], time: Float[Array, ""]
+) -> tuple[Float[Array, "points dim"], Float[Array, "points dim"]]:
+    """An inflow's velocities [m/s] and their rates of change [m/s^2], in the precision of the
+    positions whatever the profile's numbers have."""
+    found = jax.jvp(partial(profile, position), (time,), (jnp.ones_like(time),))
+    return tuple(each.astype(position.dtype) for each in found)
 
 
 class ParabolicProfile(eqx.Module):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Bool, Float
@@ -14,6 +13,7 @@ from ..parking import Parking
 from ..particles import ParticleState
 from ..ramps import ramp
 from .base import Effect
+from .fringe import held
 
 _FRONT = 0.7  # of the way from the mouth to the reserve
 _WITHIN = 1.0 - 1e-6  # of the front: a row of a lattice may lie on its very end, by round-off
@@ -262,11 +262,7 @@ class Openings(Effect):
             change, own = jnp.zeros_like(velocity), left_open[:, None]
             if opening.velocity is not None:
                 own = prescribed[:, None]
-                wanted, change = jax.jvp(
-                    lambda time, at=opening: at.velocity(position, time),
-                    (context.time,),
-                    (jnp.ones_like(context.time),),
-                )
+                wanted, change = held(opening.velocity, position, context.time)
             fill, share = self.rate * (known[:, -2] - density), left_open
             if opening.pressure is not None:
                 sound = (fluid.reference_density / fluid.sound_speed) * known[:, -1]

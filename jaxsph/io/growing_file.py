@@ -11,7 +11,7 @@ from pathlib import Path
 
 import h5py
 
-from .trajectory_file import BODIES, LOADS, UNITS, TrajectoryFileError
+from .trajectory_file import TrajectoryFileError, unit_of
 
 # gzip takes a third longer to write than lzf (6 against 4.5 ms a snapshot of 4096 particles) and
 # saves a sixth instead of a tenth; any HDF5 reads it.
@@ -84,8 +84,7 @@ def add_dataset(file, name, shape, dtype, **options) -> h5py.Dataset:
         chunks=(1, *shape) if shape else (256,),
         **options,
     )
-    kind, _, part = name.partition("/")
-    dataset.attrs["unit"] = BODIES[part] if kind == "bodies" else (UNITS | LOADS)[kind]
+    dataset.attrs["unit"] = unit_of(name)
     return dataset
 
 

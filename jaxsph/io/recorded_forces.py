@@ -17,7 +17,7 @@ from .trajectory_file import opened, patient
 
 _LAST = 0.2  # of a run: the mean of its coefficients is over that
 _MEANS = ("drag_coefficient", "lift_coefficient")
-_REFERENCES = ("reference_speed", "reference_length", "reference_density")
+REFERENCES = ("reference_speed", "reference_length", "reference_density")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ def read_forces(path: str | os.PathLike) -> dict[str, ForceHistory]:
         for name in parts(file):
             kind = kept_kind(file, "forces", name)
             force, averaged = file[f"{kind}/{name}"][:count], kind != "forces"
-            found[name] = ForceHistory(time, force, averaged, coefficient_scale(file, name))
+            scale = coefficient_scale(file[f"forces/{name}"])
+            found[name] = ForceHistory(time, force, averaged, scale)
     return found
 
 
@@ -65,7 +66,7 @@ def begin_forces(
     names = zip(forces.names, forces.reference_speeds, forces.reference_lengths, strict=True)
     for name, speed, length in names:
         made = add_dataset(file, f"{prefix}forces/{name}", (dim,), dtype)
-        for key, value in zip(_REFERENCES, (speed, length, forces.density), strict=True):
+        for key, value in zip(REFERENCES, (speed, length, forces.density), strict=True):
             made.attrs[key] = value
         for key in () if prefix else _MEANS:  # what a file may have must be there before it grows
             made.attrs[key] = np.nan
@@ -90,17 +91,18 @@ def sum_up(file: h5py.File, count: int) -> None:
     """Drag and lift coefficients as attributes of `forces/NAME`: 2 F / (rho0 U^2 L^(n - 1)) of the
     mean force along the first and the second axis over the run's last fifth."""
     for name in parts(file):
-        attributes = file[f"forces/{name}"].attrs
-        mean = _late(file, "forces", name, count)
-        for key, value in zip(_MEANS, (coefficient_scale(file, name) * mean)[:2], strict=True):
-            attributes.modify(key, value)
+        dataset = file[f"forces/{name}"]
+        mean = coefficient_scale(dataset) * _late(file, "forces", name, count)
+        for key, value in zip(_MEANS, mean[:2], strict=True):
+            dataset.attrs.modify(key, value)
 
 
-def coefficient_scale(file: h5py.File, name: str) -> float:
-    """2 / (rho0 U^2 L^(n - 1)) [1/N] of a part; NaN where it has no reference."""
-    dataset = file[f"forces/{name}"]
-    speed, length, density = (float(dataset.attrs[key]) for key in _REFERENCES)
-    return 2.0 / (density * speed**2 * length ** (dataset.shape[1] - 1))
+def coefficient_scale(dataset: h5py.Dataset, member: int | None = None) -> float:
+    """2 / (rho0 U^2 L^(n - 1)) [1/N] of the forces in a dataset, of a sweep's one for a member; NaN
+    where they have no reference."""
+    at = () if member is None else member
+    speed, length, density = (float(np.asarray(dataset.attrs[key])[at]) for key in REFERENCES)
+    return 2.0 / (density * speed**2 * length ** (dataset.shape[-1] - 1))
 
 
 def kept_kind(file: h5py.File, kind: str, name: str) -> str:
@@ -109,13 +111,17 @@ def kept_kind(file: h5py.File, kind: str, name: str) -> str:
 
 
 def _late(file: h5py.File, kind: str, name: str, count: int) -> np.ndarray:
-    """The mean over the last fifth of a run, of the means between snapshots if there are any."""
-    time, kind = file["time"][:count], kept_kind(file, kind, name)
+    """The mean over the last fifth of a run: of the means between snapshots if there are any, each
+    with the time it has in that fifth, else of the instants that lie in it."""
+    time, kind = file["time"][:count].astype(np.float64), kept_kind(file, kind, name)
     since = time[-1] - _LAST * (time[-1] - time[0])
-    # a mean is one over the time before its snapshot
-    late = time > since + 1e-9 * time[-1] if kind.startswith("mean_") else time >= since
-    late[-1] = True
-    return file[f"{kind}/{name}"][:count][late].mean(axis=0, dtype=np.float64)
+    if kind.startswith("mean_"):  # a mean is one over the time before its snapshot
+        weights = np.diff(np.maximum(time, since), prepend=since)
+    else:
+        weights = (time >= since - 1e-9 * (time[-1] - time[0])).astype(np.float64)
+    if not weights.any():  # a single snapshot
+        weights[-1] = 1.0
+    return np.average(file[f"{kind}/{name}"][:count], axis=0, weights=weights)
 
 
 def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
@@ -127,7 +133,7 @@ def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
         told = {"last_force": None, "last_torque": None}
         if count:
             mean = _late(file, "forces", name, count)
-            scale = coefficient_scale(file, name)
+            scale = coefficient_scale(file[f"forces/{name}"])
             told = {
                 "last_force": file[f"forces/{name}"][count - 1].tolist(),
                 "last_torque": file[f"torques/{name}"][count - 1].tolist(),
@@ -135,5 +141,5 @@ def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
                 "mean_torque": _late(file, "torques", name, count).tolist(),
                 **dict(zip(_MEANS, (scale * mean[:2]).tolist(), strict=True)),
             }
-        found[name] = told | {key: float(attributes[key]) for key in _REFERENCES}
+        found[name] = told | {key: float(attributes[key]) for key in REFERENCES}
     return found

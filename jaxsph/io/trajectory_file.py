@@ -20,7 +20,7 @@ from ..content import differences
 from ..domain import Box
 from ..particles import ParticleState
 from ..schedule import Schedule
-from ..trajectory import Trajectory
+from ..trajectory import Snapshot, Trajectory
 from .unclosed_file import open_to_read
 
 FORMAT = "jaxsph trajectory"
@@ -41,6 +41,7 @@ LOADS = {"forces": "N", "torques": "N m", "mean_forces": "N", "mean_torques": "N
 BODIES = {"position": "m", "angle": "rad", "velocity": "m/s", "spin": "rad/s"}
 FIELDS = ("position", "velocity", "density", "pressure")
 _ATTRIBUTES = ("scene", "parameters", "metadata", "time_step", "steps", "steps_per_snapshot")
+Rows = int | slice | tuple[int, slice]  # of a snapshot, of some, or of a sweep's member
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -182,6 +183,22 @@ def read_checkpoint(path: str | os.PathLike, step: int | None = None) -> Checkpo
         )
 
 
+def rows_of(snapshot: Snapshot) -> dict[str, Any]:
+    """What a snapshot has, by the names of its datasets."""
+    found = {name: getattr(snapshot, name, None) for name in UNITS}
+    for kind in LOADS:
+        found |= {f"{kind}/{name}": value for name, value in getattr(snapshot, kind).items()}
+    for name in () if snapshot.bodies is None else BODIES:
+        found[f"bodies/{name}"] = getattr(snapshot.bodies, name)
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def unit_of(name: str) -> str:
+    """The unit of a dataset, by its name."""
+    kind, _, part = name.partition("/")
+    return BODIES[part] if kind == "bodies" else (UNITS | LOADS)[kind]
+
+
 def growing(file: h5py.File) -> list[str]:
     """The datasets that have a row for each snapshot."""
     fields = [name for name in UNITS if name in file]
@@ -190,7 +207,7 @@ def growing(file: h5py.File) -> list[str]:
     return fields + [name for name in loads if name != "forces/time"]  # the time itself, linked
 
 
-def read_loads(file: h5py.File, rows: int | slice) -> dict[str, dict[str, np.ndarray]]:
+def read_loads(file: h5py.File, rows: Rows) -> dict[str, dict[str, np.ndarray]]:
     """Forces and torques of some snapshots, by the names of the walls' parts."""
     found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in LOADS}
     for path in growing(file):
@@ -200,14 +217,14 @@ def read_loads(file: h5py.File, rows: int | slice) -> dict[str, dict[str, np.nda
     return found
 
 
-def read_bodies(file: h5py.File, rows: int | slice) -> BodyState | None:
+def read_bodies(file: h5py.File, rows: Rows) -> BodyState | None:
     """The free bodies of some snapshots; None where there are none."""
     if "bodies" not in file:
         return None
     return BodyState(**{name: file[f"bodies/{name}"][rows] for name in BODIES})
 
 
-def read_more(file: h5py.File, rows: int | slice) -> dict[str, Any]:
+def read_more(file: h5py.File, rows: Rows) -> dict[str, Any]:
     """What some snapshots have beside their fields: forces, free bodies, who is in the flow."""
     active = file["active"][rows] if "active" in file else None
     return {**read_loads(file, rows), "bodies": read_bodies(file, rows), "active": active}

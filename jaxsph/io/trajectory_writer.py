@@ -36,6 +36,7 @@ from .trajectory_file import (
     count_up_to,
     growing,
     opened,
+    rows_of,
 )
 
 _ORIGIN = ("scene", "parameters")  # metadata that hold for a part of a run too
@@ -234,18 +235,13 @@ class TrajectoryWriter:
         """
         if step == self.last_step:
             return
-        fields = {name: getattr(snapshot, name) for name in UNITS if hasattr(snapshot, name)}
-        for kind in LOADS:
-            loads = getattr(snapshot, kind).items()
-            fields |= {f"{kind}/{name}": value for name, value in loads}
-        for name in () if snapshot.bodies is None else BODIES:
-            fields[f"bodies/{name}"] = getattr(snapshot.bodies, name)
-        self._tried(lambda: self._store({**fields, "time": time, "step": step}))
+        rows = {**rows_of(snapshot), "time": time, "step": step}  # the step last
+        self._tried(lambda: self._store(rows))
         self._count, self.last_step, self.last_time = self._count + 1, step, time
 
     def _store(self, fields: dict[str, Any]) -> None:
         for name, value in fields.items():
-            if value is not None and name in self._file:
+            if name in self._file:
                 dataset = self._file[name]
                 dataset.resize(self._count + 1, 0)
                 dataset[self._count] = np.asarray(value)

@@ -14,12 +14,15 @@ from ..full_model import FullModel
 from ..neighbors import NeighborSearch, WalledSearch
 from ..particles import ParticleState
 from ..scenes import Scene
+from ..wall_forces import WallForces
 
 _SAME = ("name", "space", "schedule")
+_REFERENCES = ("reference_lengths", "reference_speeds", "density")
 
 
 class Members(eqx.Module):
-    """Full models and their states, stacked: every array has a leading axis of members.
+    """Full models, their states and the forces on their walls, stacked: every array has a leading
+    axis of members.
 
     Args:
         arrays: of all members, (K, ...), on the host.
@@ -33,14 +36,14 @@ class Members(eqx.Module):
         """The arrays of some members."""
         return jax.tree.map(lambda a: a[np.asarray(numbers)], self.arrays)
 
-    def one(self, arrays: Any) -> tuple[FullModel, ParticleState]:
-        """Model and state of a member from its arrays, within jit."""
+    def one(self, arrays: Any) -> tuple[FullModel, ParticleState, WallForces | None]:
+        """Model, state and forces of a member from its arrays, within jit."""
         return eqx.combine(arrays, self.structure)
 
     def enlarged(self) -> Members:
         """The same members with more room for neighbours."""
-        model, state = self.structure
-        return Members(self.arrays, (model.enlarged(), state))
+        model, *rest = self.structure
+        return Members(self.arrays, (model.enlarged(), *rest))
 
 
 def stacked(scenes: Sequence[Scene]) -> Members:
@@ -60,9 +63,10 @@ def stacked(scenes: Sequence[Scene]) -> Members:
                 )
     models = [scene.model() for scene in scenes]
     search = _roomiest([model.search for model in models])
+    forces = _alike([WallForces.of(scene) for scene in scenes])
     members = [
-        eqx.partition((replace(model, search=search), scene.state), eqx.is_array)
-        for model, scene in zip(models, scenes, strict=True)
+        eqx.partition((replace(model, search=search), scene.state, on_walls), eqx.is_array)
+        for model, scene, on_walls in zip(models, scenes, forces, strict=True)
     ]
     first, structure = members[0]
     same = jax.tree.leaves(structure)  # functions that move bodies, say
@@ -82,6 +86,15 @@ def stacked(scenes: Sequence[Scene]) -> Members:
             )
     arrays = jax.tree.map(lambda *a: np.stack([np.asarray(x) for x in a]), *[m for m, _ in members])
     return Members(arrays, structure)
+
+
+def _alike(forces: Sequence[WallForces | None]) -> list[WallForces | None]:
+    """The same, all with the references of the first: what coefficients refer to is in no sum."""
+    first = forces[0]
+    if first is None:
+        return list(forces)
+    same = {name: getattr(first, name) for name in _REFERENCES}
+    return [each and replace(each, **same) for each in forces]
 
 
 def _roomiest(searches: Sequence[NeighborSearch | WalledSearch]) -> NeighborSearch | WalledSearch:

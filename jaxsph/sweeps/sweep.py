@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
@@ -20,11 +19,12 @@ from ..clumping import Clumping
 from ..compiled import full_precision
 from ..compiler_options import platform_options
 from ..devices import Devices
-from ..integrate import FaultCode, integrate
+from ..integrate import FaultCode
 from ..io import Lock
 from ..scenes import Scene
 from ..trajectory import Snapshot
 from . import sweep_file
+from .member_run import run_member
 from .members import Members, stacked
 from .room import check_room
 from .sweep_file import NOT_RUN, Status, read_status
@@ -46,8 +46,8 @@ def sweep(
     `jax.distributed` over those of all processes, which call this alike. What is written after each
     round stays: the same call goes on where a killed one ended. A member that meets a fault ends
     alone, with the snapshots that it had; one whose neighbour list overflows is run anew with more
-    room. One whose particles have clumped at its end is named in a warning. Forces on walls and
-    free bodies are not in the file.
+    room. One whose particles have clumped at its end is named in a warning. Where there are walls,
+    forces on them are kept as by `run_scene`, and so are free bodies.
 
     Args:
         scenes: that differ in what their arrays hold: coefficients and starts.
@@ -59,7 +59,8 @@ def sweep(
         progress: is called with the number of members done since its last call.
 
     Returns:
-        how each member went; `read_member(path, k)` has its snapshots.
+        how each member went; `read_member(path, k)` has its snapshots with the forces in them,
+        `read_member_forces(path, k)` what their coefficients refer to.
 
     Raises:
         ValueError: if the scenes differ in more, the batch is below one, or a device has not the
@@ -142,17 +143,7 @@ def _compiled(members: Members, scene: Scene, mesh: Mesh, batch: int) -> _Run:
     schedule = scene.schedule
 
     def member(arrays):
-        model, state = members.one(arrays)
-        step = jnp.asarray(schedule.time_step, state.density.dtype)
-        each, intervals = schedule.steps_per_snapshot, schedule.intervals
-        first = model.observe(state)
-        _, fault, later, good = integrate(
-            model, state, jnp.zeros((), jnp.int32), step, each, intervals
-        )
-        sound = jnp.all(jnp.isfinite(state.density + jnp.sum(state.velocity, axis=1)))
-        count = jnp.where(sound, 1 + jnp.sum(good, dtype=jnp.int32), 0)
-        snapshots = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, later)
-        return snapshots, (fault.code, fault.step, fault.particle, count)
+        return run_member(*members.one(arrays), schedule)
 
     @full_precision
     def share(arrays):  # what one device does

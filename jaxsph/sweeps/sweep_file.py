@@ -18,16 +18,17 @@ from jaxtyping import Int
 
 from ..content import content, differences
 from ..environment import versions
-from ..io import TrajectoryFileError, unwritable, whole_file
+from ..io import ForceHistory, TrajectoryFileError, unwritable, whole_file
+from ..io.recorded_forces import REFERENCES, coefficient_scale, kept_kind, link_time, parts
+from ..io.trajectory_file import BODIES, FIELDS, read_more, rows_of, unit_of
 from ..record import plain
 from ..scenes import Scene
 from ..trajectory import Snapshot, Trajectory
+from ..wall_forces import WallForces, named
 
 FORMAT = "jaxsph sweep"
 SCHEMA_VERSION = 1
 NOT_RUN = -1
-_UNITS = {"position": "m", "velocity": "m/s", "density": "kg/m^3", "pressure": "Pa"}
-_ACTIVE = "active"  # which particles are in the flow, where some come in or go out
 
 
 class SweepFileError(ValueError):
@@ -64,10 +65,7 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
     if path.exists():
         _check(path, identity, contents)
         return
-    state = first.state
-    times = first.schedule.times
-    shapes = {"position": state.position.shape, "velocity": state.velocity.shape}
-    shapes |= {"density": state.density.shape, "pressure": state.density.shape}
+    times, forces = first.schedule.times, [WallForces.of(scene) for scene in scenes]
     try:
         with whole_file(path) as file:
             file.attrs["format"], file.attrs["schema_version"] = FORMAT, SCHEMA_VERSION
@@ -76,21 +74,47 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
             file["content"] = [json.dumps(content) for content in contents]
             file.attrs["time_step"] = first.time_step
             file["time"] = times
-            file["time"].attrs["unit"] = "s"
-            if first.parking is not None:
-                shapes[_ACTIVE] = state.density.shape
-            for name, shape in shapes.items():
+            file["time"].attrs["unit"] = unit_of("time")
+            for name, (shape, kind) in _room(first, forces[0]).items():
                 early = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
                 early.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
                 early.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
                 whole = (len(scenes), len(times), *shape)
-                kind = np.dtype(bool if name == _ACTIVE else state.density.dtype)
-                data = file.create_dataset(name, whole, kind, dcpl=early)
-                data.attrs["unit"] = _UNITS.get(name, "1")
+                data = file.create_dataset(name, whole, np.dtype(kind), dcpl=early)
+                data.attrs["unit"] = unit_of(name)
+            for name in parts(file):
+                _refer(file[f"forces/{name}"], forces, forces[0].names.index(name))
+            link_time(file)
             for name in ("code", "step", "particle", "snapshots"):
                 file[name] = np.full(len(scenes), NOT_RUN if name != "snapshots" else 0, np.int32)
     except TrajectoryFileError as error:
         raise SweepFileError(str(error)) from None
+
+
+def _room(scene: Scene, forces: WallForces | None) -> dict[str, tuple[tuple[int, ...], Any]]:
+    """Shape and type of what each snapshot has, by the names of its datasets."""
+    state = scene.state
+    particles, dim = state.position.shape
+    dtype = state.density.dtype
+    room = {name: ((particles,), dtype) for name in FIELDS}
+    room |= {name: ((particles, dim), dtype) for name in ("position", "velocity")}
+    if scene.parking is not None:
+        room["active"] = ((particles,), bool)
+    for name in () if state.bodies is None else BODIES:
+        like = getattr(state.bodies, name)
+        room[f"bodies/{name}"] = (like.shape, like.dtype)
+    for prefix, each in (("", forces), ("mean_", named(forces))):
+        for name in () if each is None else each.names:
+            room[f"{prefix}forces/{name}"] = ((dim,), dtype)
+            room[f"{prefix}torques/{name}"] = (() if dim == 2 else (dim,), dtype)
+    return room
+
+
+def _refer(data: h5py.Dataset, forces: Sequence[WallForces], part: int) -> None:
+    """Note what each member's coefficients of a part refer to."""
+    rows = [(f.reference_speeds[part], f.reference_lengths[part], f.density) for f in forces]
+    for key, value in zip(REFERENCES, np.transpose(rows), strict=True):
+        data.attrs[key] = value
 
 
 def store(path: str | os.PathLike, number: int, snapshots: Snapshot, status: Sequence[int]) -> None:
@@ -99,12 +123,11 @@ def store(path: str | os.PathLike, number: int, snapshots: Snapshot, status: Seq
     Raises:
         SweepFileError: if they cannot be written; the member then counts as not run.
     """
-    rows = {name: getattr(snapshots, name) for name in _UNITS}
-    if snapshots.active is not None:
-        rows[_ACTIVE] = snapshots.active
     code, *rest = status
-    rows |= zip(("step", "particle", "snapshots", "code"), (*rest, code), strict=True)
     with _opened(Path(path)) as file:
+        # one that was begun before forces were kept has no room for them
+        rows = {name: value for name, value in rows_of(snapshots).items() if name in file}
+        rows |= zip(("step", "particle", "snapshots", "code"), (*rest, code), strict=True)
         kinds = {name: file[name].dtype for name in rows}
         places = {name: file[name].id.get_offset() for name in rows}
     try:  # without HDF5, which does not survive a disk that fails
@@ -130,22 +153,19 @@ def read_status(path: str | os.PathLike) -> Status:
 
 
 def read_member(path: str | os.PathLike, number: int) -> Trajectory:
-    """The good snapshots of a member.
+    """The good snapshots of a member, with the forces on its walls and its free bodies.
 
     Raises:
         SweepFileError: if the file is not a sweep's, or the member has not been run.
     """
     with _opened(Path(path)) as file:
-        count = len(file["code"])
-        if not 0 <= number < count:
-            raise SweepFileError(f"{path}: has members 0 to {count - 1}, not {number}.")
-        code, good = int(file["code"][number]), int(file["snapshots"][number])
-        if code == NOT_RUN:
-            raise SweepFileError(f"{path}: member {number} has not been run yet; go on with it.")
+        code, good = _of_member(file, path, number)
+        rows = (number, slice(good))
         record = json.loads(file.attrs["identity"])
         return Trajectory(
             time=file["time"][:good],
-            **{name: file[name][number, :good] for name in (*_UNITS, _ACTIVE) if name in file},
+            **{name: file[name][rows] for name in FIELDS},
+            **read_more(file, rows),
             metadata={
                 "scene": record["scene"],
                 "parameters": record["parameters"][number],
@@ -154,6 +174,38 @@ def read_member(path: str | os.PathLike, number: int) -> Trajectory:
                 "step": int(file["step"][number]),
             },
         )
+
+
+def read_member_forces(path: str | os.PathLike, number: int) -> dict[str, ForceHistory]:
+    """The forces on the walls of a member, `walls` and each named part.
+
+    Raises:
+        SweepFileError: if the file is not a sweep's, or the member has not been run.
+    """
+    found = {}
+    with _opened(Path(path)) as file:
+        _, good = _of_member(file, path, number)
+        for name in parts(file):
+            kind = kept_kind(file, "forces", name)
+            force = file[f"{kind}/{name}"][number, :good]
+            scale = coefficient_scale(file[f"forces/{name}"], number)
+            found[name] = ForceHistory(file["time"][:good], force, kind != "forces", scale)
+    return found
+
+
+def _of_member(file: h5py.File, path: str | os.PathLike, number: int) -> tuple[int, int]:
+    """Code and number of good snapshots of a member.
+
+    Raises:
+        SweepFileError: if there is none, or it has not been run.
+    """
+    count = len(file["code"])
+    if not 0 <= number < count:
+        raise SweepFileError(f"{path}: has members 0 to {count - 1}, not {number}.")
+    code, good = int(file["code"][number]), int(file["snapshots"][number])
+    if code == NOT_RUN:
+        raise SweepFileError(f"{path}: member {number} has not been run yet; go on with it.")
+    return code, good
 
 
 def _identity(scenes: Sequence[Scene]) -> str:

@@ -25,8 +25,10 @@ def outline_from_file(
     SVG and DXF drawings are read by trimesh (`pip install "jaxsph[geometry]"`); curves become
     polygons. Any other file is a table of two columns x, y with one polygon, or several with empty
     lines between them; lines that do not hold two numbers, such as the name on top of an airfoil's
-    file, are passed over. An SVG's y points down: what it holds is turned up about its middle, so
-    that it stands as drawn between the numbers of its file.
+    file, are passed over. An airfoil's table may also be Lednicer's: the numbers of corners of its
+    upper and its lower side, then either side from the leading edge on. An SVG's y points down:
+    what it holds is turned up about its middle, so that it stands as drawn between the numbers of
+    its file.
 
     Args:
         path: of the file.
@@ -48,7 +50,10 @@ def outline_from_file(
             rings = [np.stack([ring[:, 0], middle - ring[:, 1]], axis=1) for ring in rings]
     else:
         rings = _table(path)
-    return Outline([scale * np.asarray(ring) + np.asarray(offset) for ring in rings])
+    try:
+        return Outline([scale * np.asarray(ring) + np.asarray(offset) for ring in rings])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def solid_from_file(
@@ -146,4 +151,15 @@ def _table(path: Path) -> list[list[tuple[float, float]]]:
     rings = [ring for ring in rings if ring]
     if not rings:
         raise ValueError(f"{path}: holds no corners; give a table of two columns x, y in metres.")
-    return rings
+    return _as_one_airfoil(rings)
+
+
+def _as_one_airfoil(rings: list[list[tuple[float, float]]]) -> list[list[tuple[float, float]]]:
+    """The one polygon of a table whose first line counts the corners of two sides; others as they
+    are."""
+    (counts, *rest), *sides = rings
+    corners = [*rest, *(corner for side in sides for corner in side)]
+    if len(corners) < 4 or sum(counts) != len(corners) or min(counts) < 2:
+        return rings
+    upper, lower = corners[: int(counts[0])], corners[int(counts[0]) :]
+    return [upper[::-1] + lower[upper[0] == lower[0] :]]

@@ -54,7 +54,7 @@ class MovingBody(eqx.Module):
             return jax.jvp(self.displacement, (t,), (one,))
 
         (way, velocity), (_, acceleration) = jax.jvp(way_and_velocity, (time,), (one,))
-        return way, velocity, acceleration
+        return tuple(each.astype(time.dtype) for each in (way, velocity, acceleration))
 
 
 @final

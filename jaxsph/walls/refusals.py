@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 
 import jax.numpy as jnp
 import numpy as np
@@ -90,13 +90,15 @@ def _face(space: Space, axis: int, at: float) -> np.ndarray:
 def refuse_thin_walls(distance, space: Space, surface, normal) -> None:
     """Fluid on one side of a wall must not be felt on the other, nor by the other's ghosts."""
     needed = 2.0 * space.support
-    for depth in np.arange(0.25, needed / space.spacing, 0.5) * space.spacing:
+    depths = np.arange(0.25, needed / space.spacing, 0.5) * space.spacing
+    for before, depth in pairwise([0.0, *depths]):
         behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
         wet = distance(behind) < 0.0
         if wet.any():
+            thickness = 0.5 * (before + depth)
             raise ValueError(
-                f"walls: the wall at {place(surface[int(np.argmax(wet))])} is about {depth:.3g} m "
-                f"thick, thinner than twice the kernel's support of {space.support:.3g} m; the "
-                "fluids on its two sides would feel each other. Make it thicker or raise the "
-                "resolution."
+                f"walls: the wall at {place(surface[int(np.argmax(wet))])} is about "
+                f"{thickness:.2g} m thick, thinner than twice the kernel's support of "
+                f"{space.support:.3g} m; the fluids on its two sides would feel each other. Make "
+                f"it {needed:.3g} m thick, or raise the resolution {needed / thickness:.2g} times."
             )

@@ -110,7 +110,7 @@ class SignedDistance(Region):
     function: Callable[[Array], Array]
 
     def signed_distance(self, position):
-        return self.function(position)
+        return self.function(position).astype(position.dtype)
 
 
 @final

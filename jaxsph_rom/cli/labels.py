@@ -18,7 +18,7 @@ from jaxsph_command.config import NAME, write_config
 from ..labels import check_run, train, training_scenes
 from ..points import QDEIM, Family
 from ..study import full_run
-from .options import bar, combinations, said, trained_at, training_values
+from .options import REYNOLDS, bar, combinations, said, trained_at, training_values
 
 
 def add_to(parser: Parser, words: list[str]) -> None:
@@ -45,7 +45,7 @@ def add_to(parser: Parser, words: list[str]) -> None:
     add("--out", type=Path, metavar="DIR", help="folder of the model and its "
         "full runs, or a file ending with .h5 (default: out/labels-SCENE)")
     add_json_option(parser)
-    add_scene_options(parser, words, {"reynolds": None})
+    add_scene_options(parser, words, REYNOLDS)
     parser.set_defaults(command=_labels, precision="float64")
 
 

@@ -31,6 +31,10 @@ from ..study import PLANS, Plan, quiet
 PRODUCTS = {"euclidean": Euclidean, "energy": Energy}
 CLOSURES = ("none", "linear")
 MOST_BYTES = 4 * 2**30  # of all coordinates of a prediction
+REYNOLDS = {  # as commands read it that train models
+    "reynolds": {"help": "Reynolds number of all runs, where models are trained on others of their "
+                 "parameters"},
+}  # fmt: skip
 FORMULATIONS = ("compressible", "solenoidal")
 
 
@@ -46,7 +50,7 @@ def add_training_options(parser: Parser, words: list[str]) -> None:
     add("--settling", type=positive_float, metavar="T",
         help="time a run from rest takes before the studied time begins [s] "
         f"({defaults('settling')}; other scenes start from rest)")  # fmt: skip
-    add_scene_options(parser, words, {"reynolds": None})
+    add_scene_options(parser, words, REYNOLDS)
     parser.set_defaults(precision="float64")
 
 
@@ -120,7 +124,10 @@ def trained_at(options) -> dict[str, tuple[float, ...]] | None:
                 f"its parameters, as NAME=VALUE,VALUE: it has {', '.join(takes)}."
             )
         if name in settings_given(options):
-            raise ValueError(f"--train: {name} is given as a setting too; leave one out.")
+            raise ValueError(
+                f"{name}: is given as a setting, and models are trained over it; give its values "
+                f"by --train {name}=VALUE,VALUE, or train on other parameters."
+            )
     return values
 
 

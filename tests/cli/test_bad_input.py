@@ -170,7 +170,7 @@ REDUCED = {
     "run scenes.py:drop --train 100": "has no reynolds",
     f"{COMPARE} --train 100 viscosity=1": "has no viscosity",
     f"{COMPARE} --train 100 200 --predict 150 --modes 500": "500",
-    f"{COMPARE} --train 100 --reynolds 5": "--reynolds",
+    f"{COMPARE} --train 100 --reynolds 5": "give its values by --train reynolds=VALUE,VALUE",
     f"{COMPARE} --train 100 200 --predict 150 --tau long": "--tau: a time in s",
     f"{COMPARE} --train 100 200 --predict 150 --closure linear": "add --hyper tensor",
     f"{COMPARE} --train 100 200 --predict 150 --held-back 100": "--held-back",

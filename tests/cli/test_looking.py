@@ -118,6 +118,8 @@ def test_show_of_what_a_run_leaves(capsys):
     run = "run taylor-green --resolution 12 --arrangement lattice --t-end 0.02 --out a"
     assert main([*run.split(), "--json", "a/r.json"]) == 0
     assert main(["animate", "a/trajectory.h5", "--every", "1"]) == 0
+    assert main(["animate", "a/trajectory.h5", "--every", "9", "--out", "re_0.5"]) == 0
+    assert Path("re_0.5/trajectory.gif").is_file()
     assert main(["show", "a/trajectory.h5", "--figure", "a/f.png"]) == 0
     capsys.readouterr()
     found = {}

@@ -47,5 +47,7 @@ def test_the_inertia_of_a_moving_frame():
     frame = MovingFrame(lambda t: jnp.stack([0.5 * t**3, 2.0 * jnp.cos(t)]))
     found = frame.acceleration(jnp.asarray(2.0), jnp.zeros((3, 2)))
     np.testing.assert_allclose(found, np.broadcast_to([-6.0, 2.0 * np.cos(2.0)], (3, 2)))
-    single = frame.acceleration(jnp.asarray(2.0, jnp.float32), jnp.zeros((3, 2), jnp.float32))
-    assert single.dtype == jnp.float32
+    double = MovingFrame(lambda t: np.array([0.5, 2.0]) * t.astype(float) ** 3)
+    for each in (frame, double):
+        single = each.acceleration(jnp.asarray(2.0, jnp.float32), jnp.zeros((3, 2), jnp.float32))
+        assert single.dtype == jnp.float32

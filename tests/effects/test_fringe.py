@@ -9,6 +9,7 @@ import pytest
 
 from jaxsph.arrangements import Lattice
 from jaxsph.effects import Fringe, ParabolicProfile
+from jaxsph.effects.fringe import Varying, held
 from jaxsph.scenes import poiseuille_open
 
 TIME = jnp.zeros(())
@@ -47,6 +48,18 @@ def test_inflow_may_be_differentiated(scene):
 
     slope = float(jax.grad(total)(1.0))
     assert slope == pytest.approx(float(total(2.0) - total(1.0)), rel=1e-9)
+
+
+def test_an_inflow_has_the_precision_of_the_particles():
+    """Whatever its factor has."""
+    steady = ParabolicProfile(jnp.asarray(2.0, jnp.float32), 1.0)
+    inflow = Varying(steady, lambda t: np.array([[3.0]]) * t.astype(float))
+    x, time = jnp.full((2, 2), 0.5, jnp.float32), jnp.asarray(2.0, jnp.float32)
+    with jax.numpy_dtype_promotion("standard"):  # as users have it
+        found = held(inflow, x, time)
+    for each, wanted in zip(found, (12.0, 6.0), strict=True):
+        assert each.dtype == jnp.float32
+        np.testing.assert_allclose(each, [[wanted, 0.0]] * 2, rtol=1e-6)
 
 
 def test_bad_fringe_is_refused():

@@ -1,5 +1,6 @@
 """Sweeps of full models: equal to single runs, on many devices and processes, after a kill."""
 
+import dataclasses
 import json
 import os
 import signal
@@ -10,6 +11,9 @@ import time
 from pathlib import Path
 
 import equinox as eqx
+import h5py
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -17,9 +21,17 @@ from jaxsph import run_scene
 from jaxsph.arrangements import JitteredLattice
 from jaxsph.cli import main
 from jaxsph.integrate import FaultCode
-from jaxsph.io import Lock, TrajectoryFileError
+from jaxsph.io import Lock, TrajectoryFileError, read_forces
 from jaxsph.scenes import lid_driven_cavity, taylor_green
-from jaxsph.sweeps import SweepFileError, read_member, read_status, sweep, sweep_file
+from jaxsph.sweeps import (
+    SweepFileError,
+    read_member,
+    read_member_forces,
+    read_status,
+    sweep,
+    sweep_file,
+)
+from tests.walls.test_free_body import scene as tank
 
 ROOT = Path(__file__).parents[2]
 SNAPSHOTS = 4  # of each member
@@ -131,6 +143,45 @@ def test_a_member_that_blows_up_goes_alone(tmp_path):
     assert len(lost.time) == status.snapshots[1] < SNAPSHOTS
     assert np.isfinite(lost.velocity).all()
     np.testing.assert_array_equal(status.code[[0, 2]], 0)
+
+
+def tanks(count):
+    """A body that is free and named, in a fluid of another viscosity each."""
+    made = []
+    for k in range(count):
+        scene = dataclasses.replace(tank(), steps_per_snapshot=3, end_time=0.012)
+        viscosity = 0.01 * (1.0 + k)
+        made.append(eqx.tree_at(lambda s: s.effects[2].viscosity, scene, jnp.asarray(viscosity)))
+    return made
+
+
+@pytest.mark.parametrize("batch", [1, 2])
+def test_forces_and_free_bodies_are_those_of_single_runs(tmp_path, batch):
+    path, scenes = tmp_path / "sweep.h5", tanks(2)
+    sweep(scenes, path, batch=batch)
+    for k, scene in enumerate(scenes):
+        found, wanted = read_member(path, k), run_scene(scene, tmp_path / f"{k}.h5")
+        for name in ("forces", "torques", "mean_forces", "mean_torques"):
+            a, b = getattr(found, name), getattr(wanted, name)
+            assert a.keys() == b.keys() == {"walls", "ball"}
+            for part in a:
+                np.testing.assert_allclose(a[part], b[part], atol=1e-10 * np.abs(b["walls"]).max())
+        for a, b in zip(*map(jax.tree.leaves, (found.bodies, wanted.bodies)), strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-12)
+        told, like = read_member_forces(path, k), read_forces(tmp_path / f"{k}.h5")
+        assert {n: (h.averaged, h.scale) for n, h in told.items()} == {
+            n: (h.averaged, h.scale) for n, h in like.items()
+        }
+    assert not np.allclose(read_member(path, 0).forces["ball"], found.forces["ball"])
+
+
+def test_members_may_refer_their_forces_to_other_speeds(tmp_path):
+    """By which coefficients are made, and nothing else."""
+    path, (first, second) = tmp_path / "sweep.h5", tanks(2)
+    faster = dataclasses.replace(second.fluid, reference_speed=2.0)
+    sweep_file.create(path, [first, dataclasses.replace(second, fluid=faster)])
+    with h5py.File(path) as file:
+        assert file["forces/ball"].attrs["reference_speed"].tolist() == [1.0, 2.0]
 
 
 def test_a_list_that_overflows_is_enlarged(tmp_path, monkeypatch):

@@ -32,6 +32,23 @@ def test_a_table_is_read_scaled_and_moved(tmp_path):
     assert len(outline_from_file(path).rings) == 2
 
 
+def test_an_airfoil_s_two_sides_are_one_polygon(tmp_path):
+    """Lednicer's order: both sides from the leading edge on, their corners counted on top."""
+    upper, lower = [(0.0, 0.0), (0.3, 0.06), (1.0, 0.0)], [(0.0, 0.0), (0.4, -0.05), (1.0, 0.0)]
+    rows = "\n\n".join("\n".join(f"{x} {y}" for x, y in side) for side in (upper, lower))
+    path = tmp_path / "naca.dat"
+    path.write_text(f"NACA\n 3. 3.\n\n{rows}\n")
+    (ring,) = outline_from_file(path).rings
+    assert set(ring) == {*upper, *lower}
+    inside = outline_from_file(path).signed_distance(np.array([[0.35, 0.0], [0.35, 0.1]])) < 0.0
+    assert inside.tolist() == [True, False]
+    path.write_text("3 3\n0 1\n1 0\n")  # three corners of a polygon, no counts
+    assert len(outline_from_file(path).rings[0]) == 3
+    path.write_text("3 3\n0 1\n")
+    with pytest.raises(ValueError, match="naca.dat: Outline: a polygon has at least three"):
+        outline_from_file(path)
+
+
 def test_drawings_are_read(tmp_path):
     path = tmp_path / "box.svg"
     path.write_text(

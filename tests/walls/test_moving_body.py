@@ -57,6 +57,15 @@ class Steady(eqx.Module):
         return self.velocity * time
 
 
+def test_a_motion_has_the_precision_of_its_time():
+    """Whatever its constants have."""
+    body = MovingBody(VESSEL, lambda t: np.array([0.5, 2.0]) * t.astype(float) ** 2)
+    for dtype in (jnp.float32, jnp.float64):
+        way, velocity, acceleration = body.motion(jnp.asarray(2.0, dtype))
+        assert {each.dtype for each in (way, velocity, acceleration)} == {jnp.dtype(dtype)}
+        np.testing.assert_allclose([way, velocity, acceleration], [[2, 8], [2, 8], [1, 4]])
+
+
 class Shaken(eqx.Module):
     """d = A (1 - cos w t)"""
 
