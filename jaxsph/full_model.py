@@ -14,6 +14,7 @@ from jax import lax
 from .effects import Effect
 from .functional import SPHFunctional
 from .integrate import Fault, FaultCode, Model
+from .integrate.one_or_many import renewed_if
 from .likely_cause import likely_cause, squeezed_water
 from .neighbors import NeighborSearch, VerletList, WalledSearch, WallList
 from .parking import Parking
@@ -104,7 +105,8 @@ class FullModel(Model):
             return state, self.refresh(auxiliary, state, time_step)
         search, motion = self._motion(state, time_step)
 
-        def rebuilt(state, neighbors):
+        def rebuilt(carry):
+            state, neighbors = carry
             if self.parking is not None:  # who is put in is by number, on however many devices
                 state = self.end(state, neighbors)
                 return self._listed(state, search)
@@ -112,7 +114,7 @@ class FullModel(Model):
             return _arranged(state, new.sort), new.in_place(neighbors.order)
 
         outdated = is_outdated(search, auxiliary, state.position, motion)
-        return lax.cond(outdated, rebuilt, lambda *same: same, state, auxiliary)
+        return renewed_if(outdated, rebuilt, (state, auxiliary))
 
     def end(self, state, auxiliary):
         since = auxiliary.reference
@@ -224,7 +226,7 @@ class FullModel(Model):
 def refresh_list(search, neighbors: VerletList | WallList, position, motion):
     """The list, rebuilt if particles that move on by up to `motion` [m] would outrun its skin."""
     outdated = is_outdated(search, neighbors, position, motion)
-    return lax.cond(outdated, lambda x: search.build(x), lambda _: neighbors, position)
+    return renewed_if(outdated, lambda _: search.build(position), neighbors)
 
 
 def is_outdated(search, neighbors: VerletList | WallList, position, motion):

@@ -1,4 +1,4 @@
-"""A step that is taken or not: a branch for one run, a choice for each member of a batch."""
+"""What is done or not: a branch for one run, a choice for each member of a batch."""
 
 from __future__ import annotations
 
@@ -25,11 +25,40 @@ def moved_if(going: Bool[Array, ""], move: Callable[[Any], Any], carry: Any) -> 
         carry: a pytree.
     """
 
-    def chosen(carry):
-        take = _among_many(going)
-        return jax.tree.map(lambda new, old: lax.select(take, new, old), move(carry), carry)
+    return _branch(_alone(going), going, move, carry)
 
-    return lax.cond(_alone(going), chosen, lambda carry: carry, carry)
+
+def renewed_if(outdated: Bool[Array, ""], renew: Callable[[Any], Any], kept: Any) -> Any:
+    """`renew(kept)` where that is outdated, else what is kept.
+
+    Alone it is `lax.cond`. A batch under `jax.vmap` takes the branch where any of its members is
+    outdated, all in step; those that are not keep what they have.
+
+    Args:
+        outdated: whether.
+        renew: pure; makes anew what it is given.
+        kept: a pytree.
+    """
+    return _branch(_any(outdated), outdated, renew, kept)
+
+
+def _branch(taken, wanted, change: Callable[[Any], Any], carry: Any) -> Any:
+    def chosen(carry):
+        take = _among_many(wanted)
+        return jax.tree.map(lambda new, old: lax.select(take, new, old), change(carry), carry)
+
+    return lax.cond(taken, chosen, lambda carry: carry, carry)
+
+
+@custom_vmap
+def _any(wanted):
+    """Of one run whether it is wanted; of a batch whether it is by any."""
+    return wanted
+
+
+@_any.def_vmap
+def _(size, batched, wanted):
+    return _any(jnp.any(wanted)), False
 
 
 @custom_vmap

@@ -53,9 +53,9 @@ def sweep(
         scenes: that differ in what their arrays hold: coefficients and starts.
         path: of the HDF5 file.
         batch: members that a device runs side by side, by `jax.vmap`. On a CPU one is best: it uses
-            all cores already, and rebuilds its neighbour list only when it must, where a batch
-            builds all lists at every step. A GPU takes all members of a batch in each kernel, and
-            wants as many as fit its memory.
+            all cores already, and rebuilds its neighbour list when it must, where a batch builds
+            the lists of all when any of them must. A GPU takes all members of a batch in each
+            kernel, and wants as many as fit its memory.
         progress: is called with the number of members done since its last call.
 
     Returns:

@@ -188,7 +188,7 @@ REDUCED = {
     f"{TRAIN} --train 100 mahc=0.1": "did you mean mach?",
     f"{TRAIN} --train 100 200 --modes 90": "modes: 90 asked for",
     f"{TRAIN} --train 100 200 --out text/m.h5": "Not a directory",
-    "train scenes.py:drop --train amplitude=0.1 --amplitude 0.2": "amplitude is given as a setting",
+    "train scenes.py:drop --train amplitude=0.1 --amplitude 0.2": "is given as a setting",
     "train scenes.py:drop --train ampiltude=0.1,0.2": "did you mean amplitude?",
     # labels
     "labels": "SCENE",

@@ -74,7 +74,7 @@ def test_samples_that_do_not_carry_their_own_runs_are_refused(tmp_path, monkeypa
     [
         (WAVE, "--train"),
         (f"{WAVE} --train depth=1", "has no depth"),
-        (f"{WAVE} {TRAINED} --amplitude 0.02", "given as a setting, and models are trained over it"),
+        (f"{WAVE} {TRAINED} --amplitude 0.02", "given as a setting"),
         (f"{WAVE} {TRAINED} --modes 200", "modes: 200 asked for, more than the"),
         (f"{WAVE} {TRAINED} --samples 500", "samples: 500 asked for, but there are 1 to 128"),
         (
