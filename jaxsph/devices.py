@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -93,6 +94,17 @@ class Devices:
     def write_here(self) -> bool:
         """Whether this process is the one of theirs that writes files: the first."""
         return jax.process_index() == min(device.process_index for device in self.every)
+
+    def warn_of_kept_programs(self) -> None:
+        """Warn where XLA may stop for good: parts of a CPU that run programs which are kept."""
+        kept = jax.config.jax_compilation_cache_dir and jax.config.jax_enable_compilation_cache
+        if kept and self.count > 1 and self.every[0].platform == "cpu":
+            warnings.warn(
+                "devices: JAX's compilation cache is on, and programs that it keeps have stopped "
+                "in exchanges between parts of one CPU; leave it off there (unset "
+                "JAX_COMPILATION_CACHE_DIR).",
+                stacklevel=3,
+            )
 
     def meet(self) -> None:
         """Wait until all their processes have come there."""

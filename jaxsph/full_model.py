@@ -207,6 +207,7 @@ class FullModel(Model):
         return likely_cause(state, particle, of.space, of.fluid, of.walls, time_step, limit)
 
     def over(self, devices):
+        devices.warn_of_kept_programs()
         return dataclasses.replace(self, search=self.search.over(devices))
 
     def enlarged(self):

@@ -160,6 +160,19 @@ def test_what_is_no_set_of_devices_is_refused():
         jaxsph.Devices.first(999)
 
 
+@pytest.mark.parametrize("kept", ["programs", None])
+def test_parts_of_a_cpu_warn_of_programs_that_are_kept(monkeypatch, recwarn, kept):
+    monkeypatch.setattr(jaxsph.Devices, "count", 8)
+    folder = jax.config.jax_compilation_cache_dir
+    jax.config.update("jax_compilation_cache_dir", kept)
+    try:
+        jaxsph.Devices(jax.devices()[:1]).warn_of_kept_programs()
+    finally:
+        jax.config.update("jax_compilation_cache_dir", folder)
+    told = [str(warning.message) for warning in recwarn]
+    assert bool(told) == bool(kept) and all("JAX_COMPILATION_CACHE_DIR" in each for each in told)
+
+
 def test_a_reduced_model_is_run_by_one_device():
     class Decay(jaxsph.integrate.Model):
         def rates(self, time, state, auxiliary):
