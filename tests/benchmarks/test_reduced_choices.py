@@ -21,6 +21,17 @@ def results(path):
     return read
 
 
+def test_a_lag_is_that_of_a_wave():
+    """Between snapshots, to what a straight line between them misses."""
+    time, x = np.linspace(0.0, 1.0, 61), np.linspace(0.0, 1.0, 50)[:, None, None]
+    wave = lambda t: np.sin(6.0 * (x - t[None, None, :]))  # noqa: E731
+    for late in (0.0243, -0.0071):
+        assert particle_modes.lag(time, wave(time), wave(time - late)) == pytest.approx(
+            late, abs=2e-4
+        )
+    assert particle_modes.lag(time, wave(0.0 * time), wave(0.0 * time)) is None
+
+
 @pytest.mark.slow
 def test_memory_lengths_are_taken_up_again(tmp_path, capsys):
     path = tmp_path / "memory.json"
