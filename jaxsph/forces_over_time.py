@@ -115,6 +115,5 @@ class ForcesOverTime(Model):
     def largest_change(self, old, new):
         return self.model.largest_change(old.particles, new.particles)
 
-    def observe(self, state) -> tuple[Snapshot, Loads]:
-        """The particles, and the impulse since the start."""
-        return self.model.observe(state.particles), state.impulse
+    def observe(self, state) -> Snapshot:
+        return self.model.observe(state.particles)

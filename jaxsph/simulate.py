@@ -51,11 +51,10 @@ def _interval(model, state, first_step, time_step, steps, stepping, averaged):
     if averaged is not None:
         model = ForcesOverTime(model, averaged)
         state = model.start(state)
-    state, fault, observed, _ = integrate(model, state, first_step, time_step, steps, 1, stepping)
-    observed = jax.tree.map(lambda a: a[0], observed)
-    if averaged is None:
-        return state, fault, observed, None
-    return state.particles, fault, observed[0], state.means(averaged.names, steps * time_step)
+    state, fault, snapshots, _ = integrate(model, state, first_step, time_step, steps, 1, stepping)
+    means = None if averaged is None else state.means(averaged.names, steps * time_step)
+    state = state if averaged is None else state.particles
+    return state, fault, jax.tree.map(lambda a: a[0], snapshots), means
 
 
 def simulate(

@@ -134,7 +134,7 @@ def loads(
 ) -> Loads:
     """Forces (K, n) and torques on all parts; pure, so differentiate and map it. NaN where the
     neighbour list does not hold all pairs."""
-    return _guarded(forces, model, time, state)[0]
+    return guarded(forces, model, time, state)[0]
 
 
 @full_precision
@@ -156,14 +156,14 @@ def loads_of(
     return jax.tree.map(lambda a: jnp.where(neighbors.overflow, jnp.nan, a), whole)
 
 
-def _guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
+def guarded(forces: WallForces, model: FullModel, time, state) -> tuple[Loads, Bool[Array, ""]]:
     """The loads, and whether the neighbour list overflowed."""
     neighbors = model.at(time).prepare(state)
     passed = model.functional.passes(time, state, neighbors)
     return loads_of(forces, model.functional, passed, neighbors), neighbors.overflow
 
 
-_measured = compiled(_guarded)
+_measured = compiled(guarded)
 
 
 def _whole(forces: WallForces, model: FullModel, time, state) -> Loads:

@@ -1,5 +1,6 @@
 """A run that was killed goes on to the result of one that was not."""
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 import jaxsph
 from jaxsph.arrangements import JitteredLattice, Lattice
 from jaxsph.cli import main
+from jaxsph.cli import resume as resume_module
 from jaxsph.io import TrajectoryFileError, TrajectoryWriter, read_checkpoint, read_trajectory
 from jaxsph.kernels import WendlandC4
 from jaxsph.metrics import kinetic_energy
@@ -192,6 +194,9 @@ def test_a_finished_run_goes_on_to_a_later_end(tmp_path, capsys):
         capsys.readouterr()
         assert main([*resume, end]) == 2
         assert message in capsys.readouterr().err
+    kept = read_checkpoint(path)
+    odd = dataclasses.replace(kept, schedule=dataclasses.replace(kept.schedule, time_step=1 / 300))
+    assert resume_module._end(1.00667, odd) == pytest.approx(151 / 150, rel=1e-12)  # as advised
     branch = ["--from-step", "8", "--out", str(tmp_path / "branch")]
     assert main([*resume, "0.12", *branch]) == 0
     assert main([*resume, "0.12"]) == 0

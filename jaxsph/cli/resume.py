@@ -182,11 +182,12 @@ def _restored(path: Path, checkpoint: Checkpoint, end_time: float | None) -> Sce
 
 def _made_again(path: Path, checkpoint: Checkpoint, options, make) -> Scene:
     """The scene of the user's own function, which must be the file's; its particles as stored."""
+    if options.t_end is not None:
+        options.t_end = _end(options.t_end, checkpoint)
     precision = options.precision or checkpoint.parameters.get("dtype", "float64")
     scene = made(make, scene_settings(options, make, precision))
     wanted = content(scene)
     if options.t_end is not None and checkpoint.content is not None:
-        _check_later(options.t_end, scene, checkpoint)
         end = {name: wanted[name] for name in _END if name in wanted}
         checkpoint = dataclasses.replace(checkpoint, content=checkpoint.content | end)
     checkpoint.check(path, wanted)
@@ -213,23 +214,30 @@ def _check_unedited(path: Path, checkpoint: Checkpoint, scene: Scene) -> None:
 
 def _longer(scene: Scene, end_time: float, checkpoint: Checkpoint) -> Scene:
     """The scene up to a later time [s]."""
-    _check_later(end_time, scene, checkpoint)
+    end_time = _end(end_time, checkpoint)
     parameters = {**scene.parameters, "end_time": end_time}
     return dataclasses.replace(scene, end_time=end_time, parameters=parameters)
 
 
-def _check_later(end_time: float, scene: Scene, checkpoint: Checkpoint) -> None:
-    """A ValueError if a run has come as far already."""
-    done = max(0, checkpoint.step) * scene.time_step
+def _end(end_time: float, checkpoint: Checkpoint) -> float:
+    """A later end [s], that of the snapshot which is meant.
+
+    Raises:
+        ValueError: if a run has come as far already, or the end lies between snapshots.
+    """
+    interval, done = checkpoint.schedule.interval, max(0, checkpoint.step)
+    done = done * checkpoint.schedule.time_step
     if not end_time > done * (1.0 + 1e-9):
         raise ValueError(f"--t-end: the run has come to t = {done:g} s; give a later time.")
-    interval = scene.schedule.interval
-    number = max(math.floor(end_time / interval), round(done / interval) + 1)
-    if abs(end_time - round(end_time / interval) * interval) > 1e-6 * end_time:
+    number = round(end_time / interval)
+    if abs(end_time - number * interval) > _SAME_TIME * interval:
+        number = max(math.floor(end_time / interval), round(done / interval) + 1)
         raise ValueError(
             f"--t-end: {end_time:g} s lies between snapshots, which the run has every "
             f"{interval:g} s; give {number * interval:.6g} or {(number + 1) * interval:.6g}."
         )
+    near = abs(end_time - number * interval) <= 1e-9 * end_time
+    return end_time if near else number * interval
 
 
 def _later(scene: Scene, state: ParticleState) -> Scene:

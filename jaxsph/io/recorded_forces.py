@@ -17,7 +17,7 @@ from .trajectory_file import opened, patient
 
 _LAST = 0.2  # of a run: the mean of its coefficients is over that
 _MEANS = ("drag_coefficient", "lift_coefficient")
-REFERENCES = ("reference_speed", "reference_length", "reference_density")
+_REFERENCES = ("reference_speed", "reference_length", "reference_density")
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def begin_forces(
     names = zip(forces.names, forces.reference_speeds, forces.reference_lengths, strict=True)
     for name, speed, length in names:
         made = add_dataset(file, f"{prefix}forces/{name}", (dim,), dtype)
-        for key, value in zip(REFERENCES, (speed, length, forces.density), strict=True):
+        for key, value in zip(_REFERENCES, (speed, length, forces.density), strict=True):
             made.attrs[key] = value
         for key in () if prefix else _MEANS:  # what a file may have must be there before it grows
             made.attrs[key] = np.nan
@@ -97,12 +97,15 @@ def sum_up(file: h5py.File, count: int) -> None:
             dataset.attrs.modify(key, value)
 
 
-def coefficient_scale(dataset: h5py.Dataset, member: int | None = None) -> float:
-    """2 / (rho0 U^2 L^(n - 1)) [1/N] of the forces in a dataset, of a sweep's one for a member; NaN
-    where they have no reference."""
-    at = () if member is None else member
-    speed, length, density = (float(np.asarray(dataset.attrs[key])[at]) for key in REFERENCES)
-    return 2.0 / (density * speed**2 * length ** (dataset.shape[-1] - 1))
+def coefficient_scale(dataset: h5py.Dataset) -> float:
+    """2 / (rho0 U^2 L^(n - 1)) [1/N] of the forces in a dataset; NaN where these have no reference.
+    """
+    return scale_of(*(float(dataset.attrs[key]) for key in _REFERENCES), dataset.shape[-1])
+
+
+def scale_of(speed: float, length: float, density: float, dim: int) -> float:
+    """The same of U [m/s], L [m] and rho0 [kg/m^3]."""
+    return 2.0 / (density * speed**2 * length ** (dim - 1))
 
 
 def kept_kind(file: h5py.File, kind: str, name: str) -> str:
@@ -121,7 +124,8 @@ def _late(file: h5py.File, kind: str, name: str, count: int) -> np.ndarray:
         weights = (time >= since - 1e-9 * (time[-1] - time[0])).astype(np.float64)
     if not weights.any():  # a single snapshot
         weights[-1] = 1.0
-    return np.average(file[f"{kind}/{name}"][:count], axis=0, weights=weights)
+    late = weights > 0.0
+    return np.average(file[f"{kind}/{name}"][:count][late], axis=0, weights=weights[late])
 
 
 def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
@@ -141,5 +145,5 @@ def told(file: h5py.File, count: int) -> dict[str, dict[str, Any]]:
                 "mean_torque": _late(file, "torques", name, count).tolist(),
                 **dict(zip(_MEANS, (scale * mean[:2]).tolist(), strict=True)),
             }
-        found[name] = told | {key: float(attributes[key]) for key in REFERENCES}
+        found[name] = told | {key: float(attributes[key]) for key in _REFERENCES}
     return found

@@ -15,6 +15,7 @@ from ..neighbors import NeighborSearch, WalledSearch
 from ..particles import ParticleState
 from ..scenes import Scene
 from ..wall_forces import WallForces
+from ..walls.turning import alike
 
 _SAME = ("name", "space", "schedule")
 _REFERENCES = ("reference_lengths", "reference_speeds", "density")
@@ -89,12 +90,17 @@ def stacked(scenes: Sequence[Scene]) -> Members:
 
 
 def _alike(forces: Sequence[WallForces | None]) -> list[WallForces | None]:
-    """The same, all with the references of the first: what coefficients refer to is in no sum."""
+    """The same, all with the references of the first, for what coefficients refer to is in no sum,
+    and with room for as many parts that turn."""
     first = forces[0]
     if first is None:
         return list(forces)
     same = {name: getattr(first, name) for name in _REFERENCES}
-    return [each and replace(each, **same) for each in forces]
+    turnings = alike([each and each.turning for each in forces])
+    return [
+        each and replace(each, turning=turning, **same)
+        for each, turning in zip(forces, turnings, strict=True)
+    ]
 
 
 def _roomiest(searches: Sequence[NeighborSearch | WalledSearch]) -> NeighborSearch | WalledSearch:

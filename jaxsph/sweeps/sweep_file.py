@@ -19,7 +19,7 @@ from jaxtyping import Int
 from ..content import content, differences
 from ..environment import versions
 from ..io import ForceHistory, TrajectoryFileError, unwritable, whole_file
-from ..io.recorded_forces import REFERENCES, coefficient_scale, kept_kind, link_time, parts
+from ..io.recorded_forces import kept_kind, link_time, parts, scale_of
 from ..io.trajectory_file import BODIES, FIELDS, read_more, rows_of, unit_of
 from ..record import plain
 from ..scenes import Scene
@@ -83,7 +83,7 @@ def create(path: str | os.PathLike, scenes: Sequence[Scene]) -> None:
                 data = file.create_dataset(name, whole, np.dtype(kind), dcpl=early)
                 data.attrs["unit"] = unit_of(name)
             for name in parts(file):
-                _refer(file[f"forces/{name}"], forces, forces[0].names.index(name))
+                file[f"references/{name}"] = _references(forces, forces[0].names.index(name))
             link_time(file)
             for name in ("code", "step", "particle", "snapshots"):
                 file[name] = np.full(len(scenes), NOT_RUN if name != "snapshots" else 0, np.int32)
@@ -110,11 +110,12 @@ def _room(scene: Scene, forces: WallForces | None) -> dict[str, tuple[tuple[int,
     return room
 
 
-def _refer(data: h5py.Dataset, forces: Sequence[WallForces], part: int) -> None:
-    """Note what each member's coefficients of a part refer to."""
-    rows = [(f.reference_speeds[part], f.reference_lengths[part], f.density) for f in forces]
-    for key, value in zip(REFERENCES, np.transpose(rows), strict=True):
-        data.attrs[key] = value
+def _references(forces: Sequence[WallForces], part: int) -> np.ndarray:
+    """Speed [m/s], length [m] and density [kg/m^3] (K, 3) that each member's coefficients of a part
+    refer to."""
+    return np.array(
+        [(f.reference_speeds[part], f.reference_lengths[part], f.density) for f in forces]
+    )
 
 
 def store(path: str | os.PathLike, number: int, snapshots: Snapshot, status: Sequence[int]) -> None:
@@ -188,7 +189,7 @@ def read_member_forces(path: str | os.PathLike, number: int) -> dict[str, ForceH
         for name in parts(file):
             kind = kept_kind(file, "forces", name)
             force = file[f"{kind}/{name}"][number, :good]
-            scale = coefficient_scale(file[f"forces/{name}"], number)
+            scale = scale_of(*map(float, file[f"references/{name}"][number]), force.shape[1])
             found[name] = ForceHistory(file["time"][:good], force, kind != "forces", scale)
     return found
 

@@ -26,9 +26,9 @@ def outline_from_file(
     polygons. Any other file is a table of two columns x, y with one polygon, or several with empty
     lines between them; lines that do not hold two numbers, such as the name on top of an airfoil's
     file, are passed over. An airfoil's table may also be Lednicer's: the numbers of corners of its
-    upper and its lower side, then either side from the leading edge on. An SVG's y points down:
-    what it holds is turned up about its middle, so that it stands as drawn between the numbers of
-    its file.
+    upper and its lower side, then either side from the leading edge on, x growing along both. An
+    SVG's y points down: what it holds is turned up about its middle, so that it stands as drawn
+    between the numbers of its file.
 
     Args:
         path: of the file.
@@ -157,9 +157,15 @@ def _table(path: Path) -> list[list[tuple[float, float]]]:
 def _as_one_airfoil(rings: list[list[tuple[float, float]]]) -> list[list[tuple[float, float]]]:
     """The one polygon of a table whose first line counts the corners of two sides; others as they
     are."""
-    (counts, *rest), *sides = rings
-    corners = [*rest, *(corner for side in sides for corner in side)]
-    if len(corners) < 4 or sum(counts) != len(corners) or min(counts) < 2:
+    (counts, *rest), *others = rings
+    corners = [*rest, *(corner for other in others for corner in other)]
+    number = int(counts[0]) if math.isfinite(counts[0]) else 0
+    upper, lower = sides = corners[:number], corners[number:]
+    if (
+        tuple(map(len, sides)) != counts
+        or min(counts) < 3
+        or any(side != sorted(side, key=lambda corner: corner[0]) for side in sides)
+        or upper[0][0] != lower[0][0]
+    ):
         return rings
-    upper, lower = corners[: int(counts[0])], corners[int(counts[0]) :]
     return [upper[::-1] + lower[upper[0] == lower[0] :]]

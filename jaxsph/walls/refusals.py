@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise, product
 
 import jax.numpy as jnp
@@ -95,10 +96,11 @@ def refuse_thin_walls(distance, space: Space, surface, normal) -> None:
         behind = np.asarray(space.box.wrap(jnp.asarray(surface - depth * normal)))
         wet = distance(behind) < 0.0
         if wet.any():
-            thickness = 0.5 * (before + depth)
+            thickness = max(before, 0.5 * depth)
+            finer = math.ceil(10.0 * needed / thickness) / 10.0
             raise ValueError(
                 f"walls: the wall at {place(surface[int(np.argmax(wet))])} is about "
                 f"{thickness:.2g} m thick, thinner than twice the kernel's support of "
                 f"{space.support:.3g} m; the fluids on its two sides would feel each other. Make "
-                f"it {needed:.3g} m thick, or raise the resolution {needed / thickness:.2g} times."
+                f"it {needed:.3g} m thick, or raise the resolution {finer:g} times."
             )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -57,6 +59,21 @@ class Turning(eqx.Module):
         """d_i u_j [1/s] at each point, zero where nothing turns."""
         each = jnp.einsum("kig,gj->kij", self.fit, velocity)
         return jnp.einsum("kc,kij->cij", self.part, each)
+
+
+def alike(turnings: Sequence[Turning | None]) -> list[Turning | None]:
+    """The same, each with as many parts as the one with most, zeros for those that do not turn; of
+    the same walls."""
+    some = [each for each in turnings if each is not None]
+    if not some:
+        return list(turnings)
+    rows = max(len(each.fit) for each in some)
+
+    def padded(leaf):
+        return np.concatenate([leaf, np.zeros((rows - len(leaf), *leaf.shape[1:]), leaf.dtype)])
+
+    none = jax.tree.map(lambda leaf: np.zeros_like(leaf[:0]), some[0])
+    return [jax.tree.map(padded, each or none) for each in turnings]
 
 
 def _turn(place: np.ndarray, velocity: np.ndarray) -> np.ndarray | None:

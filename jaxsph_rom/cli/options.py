@@ -38,9 +38,11 @@ REYNOLDS = {  # as commands read it that train models
 FORMULATIONS = ("compressible", "solenoidal")
 
 
-def add_training_options(parser: Parser, words: list[str]) -> None:
+def add_training_options(
+    parser: Parser, words: list[str], reynolds: dict[str, Any] = REYNOLDS
+) -> None:
     """What full runs are made and how they are reduced; after a command's own options, which the
-    scene's settings leave alone."""
+    scene's settings leave alone. `reynolds` is how that setting of the scene is read."""
     add = parser.add_argument
     add("--train", type=training_values, nargs="+", metavar="RE",
         help=f"Reynolds numbers to train on ({defaults('train')}), or START:STOP:COUNT; or other "
@@ -50,7 +52,7 @@ def add_training_options(parser: Parser, words: list[str]) -> None:
     add("--settling", type=positive_float, metavar="T",
         help="time a run from rest takes before the studied time begins [s] "
         f"({defaults('settling')}; other scenes start from rest)")  # fmt: skip
-    add_scene_options(parser, words, REYNOLDS)
+    add_scene_options(parser, words, reynolds)
     parser.set_defaults(precision="float64")
 
 

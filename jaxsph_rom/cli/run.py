@@ -114,7 +114,8 @@ def add_to(parser: Parser, words: list[str]) -> None:
         "0.25)")  # fmt: skip
     add("--out", type=Path, metavar="DIR", help="folder for all results (default: out/rom-SCENE)")
     add_json_option(parser)
-    add_training_options(parser, words)
+    # not for it, which compares models over Reynolds numbers: an error tells what is
+    add_training_options(parser, words, {"reynolds": {"help": argparse.SUPPRESS}})
     parser.set_defaults(command=_run, inner_product=None)
 
 

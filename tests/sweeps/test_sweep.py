@@ -31,6 +31,8 @@ from jaxsph.sweeps import (
     sweep,
     sweep_file,
 )
+from jaxsph.sweeps.member_run import _judged
+from jaxsph.sweeps.members import stacked
 from tests.walls.test_free_body import scene as tank
 
 ROOT = Path(__file__).parents[2]
@@ -179,9 +181,32 @@ def test_members_may_refer_their_forces_to_other_speeds(tmp_path):
     """By which coefficients are made, and nothing else."""
     path, (first, second) = tmp_path / "sweep.h5", tanks(2)
     faster = dataclasses.replace(second.fluid, reference_speed=2.0)
-    sweep_file.create(path, [first, dataclasses.replace(second, fluid=faster)])
+    scenes = [first, dataclasses.replace(second, fluid=faster)]
+    sweep_file.create(path, scenes)
     with h5py.File(path) as file:
-        assert file["forces/ball"].attrs["reference_speed"].tolist() == [1.0, 2.0]
+        assert file["references/ball"][:, 0].tolist() == [1.0, 2.0]
+    *_, forces = stacked(scenes).structure
+    assert forces.reference_speeds == (1.0, 1.0)
+
+
+def test_members_may_turn_where_others_do_not():
+    """A ball that starts at rest, and one that turns."""
+    members = stacked([dataclasses.replace(tank(spin=s), end_time=0.012) for s in (0.0, 0.5)])
+    *_, forces = members.arrays
+    rest, turning = forces.turning.fit
+    assert not rest.any() and turning.any()
+
+
+def test_bad_forces_come_before_a_later_fault():
+    """Code, step, particle and number of good snapshots."""
+    fault = tuple(jnp.asarray(n, jnp.int32) for n in (FaultCode.BEYOND_WALL, 9, 5, 4))
+    for bad, overflow, wanted in (
+        ([0, 0, 0, 0], [0, 0, 0, 1], (FaultCode.BEYOND_WALL, 9, 5, 4)),
+        ([0, 0, 1, 1], [0, 0, 0, 1], (FaultCode.NOT_FINITE, 6, -1, 2)),
+        ([0, 1, 1, 1], [0, 1, 0, 0], (FaultCode.NEIGHBOR_OVERFLOW, 3, -1, 1)),
+    ):
+        found = _judged(fault, jnp.asarray(bad, bool), jnp.asarray(overflow, bool), 3)
+        assert tuple(map(int, found)) == wanted
 
 
 def test_a_list_that_overflows_is_enlarged(tmp_path, monkeypatch):

@@ -44,6 +44,9 @@ def test_an_airfoil_s_two_sides_are_one_polygon(tmp_path):
     assert inside.tolist() == [True, False]
     path.write_text("3 3\n0 1\n1 0\n")  # three corners of a polygon, no counts
     assert len(outline_from_file(path).rings[0]) == 3
+    for table in ("2 2\n4 2\n4 4\n2 4\n2 2", "3 4\n5 4\n5 6\n3 6\n\n10 4\n12 4\n12 6\n10 6"):
+        path.write_text(table)  # squares that might be counts and sides
+        assert [len(r) for r in outline_from_file(path).rings] == [4] * len(table.split("\n\n"))
     path.write_text("3 3\n0 1\n")
     with pytest.raises(ValueError, match="naca.dat: Outline: a polygon has at least three"):
         outline_from_file(path)
