@@ -288,6 +288,7 @@ def test_a_run_taken_up_again_is_the_unbroken_one(plug, tmp_path):
     assert shown.position[:, 0].min() > scene.space.box.lower[0] - 0.1
 
 
+@pytest.mark.run_once
 def test_derivatives_are_those_of_the_flow():
     """The mean speed in a channel by the inflow's, forward and reverse, beside differences."""
     scene = poiseuille_open(8, ends="openings", h_over_dx=1.5, end_time=0.05)
